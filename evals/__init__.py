@@ -1,1 +1,1 @@
-"""How good it is: suites of tasks, graders and the tables they print."""
+"""Evaluation: suites of tasks, graders, and the tables of their results."""

@@ -1,7 +1,7 @@
-"""Two versions side by side: how large the difference is first, then whether it could be chance.
+"""Comparison of two versions: first how large the difference is, then whether it could be chance.
 
-Rests on trials that both have, paired by task and number, which meet the same seed. What is said of
-new tasks takes the task as the sampling unit; the fixed-task figures are of these tasks alone.
+It rests on trials that both have, paired by task and number, which have the same seed. Claims
+about new tasks take the task as the sampling unit; fixed-task figures hold for these tasks alone.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -53,7 +53,7 @@ class _Pairs:
         return self.scores[1] - self.scores[0]
 
     def means(self, value: Callable[[TrialRow], float]) -> tuple[float, float]:
-        """Of both versions."""
+        """Return the means of a value over the trials, (old, new)."""
         old, new = (
             float(np.mean([value(row) for row in side])) for side in zip(*self.rows, strict=True)
         )
@@ -105,7 +105,7 @@ def compare(
 
 
 def only_arm(rows: Iterable[TrialRow]) -> Arm:
-    """The arm that all rows are of.
+    """Return the arm that all rows are of.
 
     Raises:
         InputError: there are none or several; the text names them.
@@ -119,7 +119,7 @@ def only_arm(rows: Iterable[TrialRow]) -> Arm:
 
 
 def _pairs(a: Sequence[TrialRow], b: Sequence[TrialRow], metric: Metric) -> dict[str, _Pairs]:
-    """By task, sorted."""
+    """Return the pairs of each task, sorted by task."""
     old = {(row.task, row.trial): row for row in a if row.scored}
     tasks: dict[str, list[tuple[TrialRow, TrialRow]]] = {}
     for row in sorted(b, key=lambda row: row.order):
@@ -167,7 +167,7 @@ def _row_tokens(row: TrialRow) -> float:
 
 
 def _unfinished(a: Sequence[TrialRow], b: Sequence[TrialRow]) -> list[str]:
-    """What is wrong with the runs, so that no verdict should rest on them."""
+    """Return what is wrong with the runs, so that no verdict should rest on them."""
     found = list[str]()
     for name, rows, others in (("A", a, b), ("B", b, a)):
         errors = sum(not row.scored for row in rows)
@@ -246,7 +246,7 @@ def _of_version(tasks: dict[str, _Pairs], side: int, metric: Metric) -> Score:
 def _slices(
     tasks: dict[str, _Pairs], metric: Metric, margin: float
 ) -> dict[str, dict[str, Difference]]:
-    """By category and by setup, where tasks have them; p adjusted over all of them together."""
+    """Return differences by category and by setup, if any; p is adjusted over all together."""
     found: dict[tuple[str, str], Difference] = {}
     for kind in SLICES:
         named = {task: str(getattr(pairs.rows[0][1], kind)) for task, pairs in tasks.items()}
@@ -263,7 +263,7 @@ def _slices(
 
 
 def _gate_settled(judged: Gated, tasks: dict[str, _Pairs], margin: float) -> Needed | None:
-    """What would tell the success from the margin, if it is that which is open."""
+    """Return what would tell the success from the margin, if that is what is undecided."""
     low, high = judged.success.low, judged.success.high
     if judged.verdict != "inconclusive" or low > -margin or high < -margin:
         return None

@@ -1,4 +1,4 @@
-"""What a comparison consists of: printed by `--json`, written by `--out`, read by promotion."""
+"""The parts of a comparison: printed by `--json`, written by `--out`, read by promotion."""
 
 from typing import Annotated, Literal
 
@@ -16,7 +16,7 @@ Rounded = Annotated[float, PlainSerializer(lambda value: round(value, 6), return
 
 
 def in_points(share: float) -> str:
-    """A difference of shares in points, with its sign."""
+    """Return a difference of shares in points, with its sign."""
     return f"{round(100 * share, 1) + 0.0:+.1f}"
 
 
@@ -32,7 +32,7 @@ class Range(_Value):
 
     @classmethod
     def of(cls, interval: Interval) -> "Range":
-        """As a value; at most from -1 to 1."""
+        """Return an interval as a range, cut off at -1 and 1."""
         return cls(low=max(-1.0, interval.low), high=min(1.0, interval.high))
 
 
@@ -41,7 +41,7 @@ class Score(_Value):
 
     Attributes:
         new_tasks: interval on tasks like these.
-        fixed_tasks: on these tasks; None for scores that are no shares of trials.
+        fixed_tasks: interval on these tasks; None for scores that are no shares of trials.
         pass_k: the chance that k trials of a task all succeed, by k, as far as there are trials.
     """
 
@@ -77,7 +77,7 @@ class Difference(_Value):
 
 
 class Comparison(_Value):
-    """What `formup eval compare` and `gate` say, and `formup prompts promote` reads.
+    """What `formup eval compare` and `gate` report, and `formup prompts promote` reads.
 
     Attributes:
         a: the old version, or baseline.
@@ -85,7 +85,7 @@ class Comparison(_Value):
         verdict: of the gate.
         reasons: of the verdict, and what is wrong with the runs.
         outcome: of the comparison: better, worse or inconclusive.
-        success, invalid, tokens: what the gate rests on.
+        success, invalid, tokens: the figures that the gate rests on.
     """
 
     a: Arm

@@ -1,8 +1,8 @@
-"""In which frame a model writes coordinates, seen in a picture of five marks it is asked for.
+"""The frame in which a model writes coordinates, found by asking it for five marks in a picture.
 
-Some write rows before columns, on a grid of 1,000 whatever the picture's size, as shares, or pixels
-of the picture as it was made smaller for them. Graded as pixels that would fail for no fault in
-what they see, and fake the paper's zeros.
+Some write rows before columns, on a grid of 1,000 whatever the picture's size, as shares, or in
+pixels of the picture as it was scaled down for them. Graded as pixels these would fail for no
+fault in what they see, and fake the paper's zeros.
 """
 
 from collections.abc import Iterator
@@ -29,14 +29,14 @@ MARKS = {
     "yellow": (0.71, 0.68),
     "black": (0.21, 0.89),
 }
-"""Discs, by colour: where, as shares of the picture; no two alike in any frame."""
+"""Positions of the discs by colour, as shares of the picture; no two are alike in any frame."""
 ASKED = (
     f"Place {len(MARKS)} robots, one exactly on the middle of each disc, in this order: "
     f"{', '.join(MARKS)}."
 )
 RADIUS = 14
 MOST = 0.02
-"""Largest error over the diagonal at which a frame is known."""
+"""Largest error, as a share of the diagonal, at which a frame counts as known."""
 FILE, PICTURE = "frames.json", "marks.png"
 
 
@@ -44,7 +44,7 @@ class Frame(BaseModel, frozen=True):
     """How written numbers become pixels.
 
     Attributes:
-        swapped: y stands before x.
+        swapped: whether y is written before x.
         parts: into how many each side is divided, such as 1000; 0 for pixels.
         long: longer side of the resized picture whose pixels they are, px; 0 for the real one.
     """
@@ -55,14 +55,14 @@ class Frame(BaseModel, frozen=True):
 
     @property
     def name(self) -> str | None:
-        """What it is called in results; None for the usual one."""
+        """Its name in results; None for the usual one."""
         order = ["y before x"] if self.swapped else []
         shares = [f"0 to {self.parts}"] if self.parts else []
         resized = [f"pixels of {self.long}"] if self.long else []
         return ", ".join(order + shares + resized) or None
 
     def pixels(self, written: Positions, size: tuple[int, int]) -> Positions:
-        """The positions in pixels of a picture of a size."""
+        """Return the positions in pixels of a picture of a size, (width, height)."""
         points = np.asarray(written, dtype=float).reshape(-1, 2)
         points = points[:, ::-1] if self.swapped else points
         if self.parts:
@@ -75,36 +75,36 @@ class Frame(BaseModel, frozen=True):
 PIXELS = Frame()
 
 
-class Calibrated(BaseModel):
-    """The frame of a model and how far from it the marks were, over the diagonal."""
+class Calibration(BaseModel):
+    """The frame of a model, and the largest error of its marks as a share of the diagonal."""
 
     frame: Frame
     error: float
 
     @property
     def comparable(self) -> bool:
-        """Whether what the model writes can be told from where it means."""
+        """Whether the frame is known well enough to tell where the model means."""
         return self.error <= MOST
 
 
 class _File(BaseModel):
-    models: dict[str, Calibrated] = {}
+    models: dict[str, Calibration] = {}
 
 
-def frame_of(written: Positions) -> Calibrated:
-    """The frame in which five marks were written: the plainest that fits, else the nearest."""
+def frame_of(written: Positions) -> Calibration:
+    """Return the frame in which marks were written: the plainest that fits, else the nearest."""
     truth = np.array(list(MARKS.values())) * SIZE
-    found = list[Calibrated]()
+    found = list[Calibration]()
     for frame in _frames(written, truth):
         off = np.linalg.norm(np.asarray(frame.pixels(written, SIZE)) - truth, axis=1)
-        found.append(Calibrated(frame=frame, error=float(off.max() / np.hypot(*SIZE))))
+        found.append(Calibration(frame=frame, error=float(off.max() / np.hypot(*SIZE))))
         if found[-1].comparable:
             return found[-1]
     return min(found, key=lambda made: made.error)
 
 
-def calibrated(agent: Agent, model: str, folder: Path) -> Calibrated:
-    """The frame of a model, asked once in each run and kept in its folder.
+def calibrate(agent: Agent, model: str, folder: Path) -> Calibration:
+    """Return the frame of a model, which is asked once in each run and stored in its folder.
 
     Args:
         agent: the model alone, under the prompt of the run.
@@ -112,7 +112,7 @@ def calibrated(agent: Agent, model: str, folder: Path) -> Calibrated:
         folder: of the run.
 
     Raises:
-        InputError: no frame can be read out of what it answered, or it could not be asked.
+        InputError: no frame can be read from its answer, or it could not be asked.
     """
     path = folder / FILE
     known = _File.model_validate_json(path.read_bytes()) if path.exists() else _File()
@@ -131,7 +131,7 @@ def calibrated(agent: Agent, model: str, folder: Path) -> Calibrated:
 
 
 def _frames(written: Positions, truth: FloatArray) -> Iterator[Frame]:
-    """Those that come into question, the plainest first."""
+    """Yield the frames that are possible, the plainest first."""
     for swapped in (False, True):
         yield Frame(swapped=swapped)
         for parts in (1000, 1, 100):
@@ -143,7 +143,7 @@ def _frames(written: Positions, truth: FloatArray) -> Iterator[Frame]:
 
 
 def _picture_of_marks(folder: Path) -> Path:
-    """The picture of the marks, in a folder."""
+    """Draw the picture of the marks into a folder, and return its path."""
     image = Image.new("RGB", SIZE, (225, 225, 225))
     draw = ImageDraw.Draw(image)
     for colour, (x, y) in MARKS.items():

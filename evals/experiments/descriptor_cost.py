@@ -1,4 +1,4 @@
-"""How many tokens the three descriptors of a shape cost a model, on the same shapes.
+"""The cost of the three descriptors of a shape in a model's tokens, on the same shapes.
 
 The paper compares edges, edges with vertices, and a binary matrix (its Table III); here the things
 are those that a suite's tasks are about, each by its true outline.
@@ -24,7 +24,7 @@ class DescriptorCost:
     """Tokens of describe_shape's reply under one descriptor.
 
     Attributes:
-        overhead: tokens over those of edges less one, over all shapes, as the paper has it.
+        overhead: tokens over those of edges, minus 1, over all shapes, as in the paper.
     """
 
     descriptor: str
@@ -34,7 +34,7 @@ class DescriptorCost:
 
 
 def descriptor_costs(tasks: Iterable[Task], pictures: Mapping[str, Path]) -> list[DescriptorCost]:
-    """The cost of each descriptor over the things that tasks are about, each thing once.
+    """Return the cost of each descriptor over the things that tasks are about, each thing once.
 
     Args:
         tasks: of a suite.

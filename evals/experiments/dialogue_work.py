@@ -1,4 +1,4 @@
-"""Holds a dialogue with an agent, turn by turn, as a front end does, and grades every turn."""
+"""Dialogues with an agent, held turn by turn as a front end does, with every turn graded."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from .pointing import Pointing
 
 
 @dataclass(frozen=True)
-class Held:
-    """A dialogue that was held.
+class DialogueRecord:
+    """The record of a dialogue.
 
     Attributes:
         runs: after each turn.
@@ -33,7 +33,7 @@ class Held:
     grades: Sequence[TurnGrade]
 
     def as_data(self, dialogue: Dialogue) -> list[dict[str, Any]]:
-        """What was said, what came of it and what was wrong, turn by turn, as JSON."""
+        """Return what was said, what came of it and what was wrong, turn by turn, as JSON data."""
         return [
             {
                 "words": turn.words,
@@ -58,8 +58,8 @@ def hold(
     settings: Settings,
     pointing: Pointing,
     trace: Path | None,
-) -> Held:
-    """Say every turn of a dialogue to an agent, whatever came of those before.
+) -> DialogueRecord:
+    """Say every turn of a dialogue to an agent, whatever the results of those before, and grade it.
 
     Raises:
         ModelError, FleetError, OSError: as running an agent does.
@@ -80,11 +80,11 @@ def hold(
         after = state_of(talk.run)
         grades.append(grade_turn(turn, case_of(dialogue, states, after, task.metres_per_pixel)))
         states.append(after)
-    return Held(runs, states[1:], grades)
+    return DialogueRecord(runs, states[1:], grades)
 
 
 def state_of(run: Run) -> State:
-    """What stands after a turn, from its report."""
+    """Return the state after a turn, from its report."""
     report, world = run.report, run.world
     positions = np.asarray(report.positions or (), dtype=float).reshape(-1, 2)
     numbers = tuple(str(i) for i in range(1, len(positions) + 1))

@@ -1,6 +1,6 @@
 """Where trials run: here, in a pool of processes, or on a Ray cluster, behind one protocol.
 
-All three call `attempt`, so a row is the same wherever it was made, but for its times and host.
+All three call `attempt`, so a row is the same wherever it was made, except for times and host.
 """
 
 import multiprocessing
@@ -20,7 +20,7 @@ from .trials import Trial, TrialRow
 Work = Callable[[Trial], TrialRow]
 """Runs and grades a trial; picklable where another process calls it."""
 PER_WORKER = 2
-"""Trials under way for each worker, so that none waits for the next."""
+"""Trials submitted at once for each worker, so that none waits for the next."""
 
 
 class Executor(Protocol):
@@ -33,24 +33,24 @@ class Executor(Protocol):
     capacity: int
 
     def start(self, work: Work) -> None:
-        """Make ready to call `work`."""
+        """Get ready to call `work`."""
         ...
 
     def submit(self, trial: Trial) -> None:
-        """Take on a trial."""
+        """Accept a trial."""
         ...
 
     def collect(self) -> list[TrialRow]:
-        """Rows that are done; waits for the first."""
+        """Return the rows that are done; wait for the first."""
         ...
 
     def close(self) -> None:
-        """Let go of everything; trials not begun are dropped."""
+        """Release everything; trials that have not begun are dropped."""
         ...
 
 
 def attempt(work: Work, trial: Trial) -> TrialRow:
-    """Run a trial; what providers, robots or the network cannot help is an infrastructure error.
+    """Run a trial; failures of providers, robots or the network give an infrastructure error.
 
     Any other exception is a bug and ends the run.
 
@@ -74,11 +74,11 @@ class Serial:
     capacity = 1
 
     def start(self, work: Work) -> None:
-        """Make ready."""
+        """Get ready."""
         self._work, self._waiting = work, list[Trial]()
 
     def submit(self, trial: Trial) -> None:
-        """Take on a trial."""
+        """Accept a trial."""
         self._waiting.append(trial)
 
     def collect(self) -> list[TrialRow]:
@@ -87,14 +87,14 @@ class Serial:
         return [attempt(self._work, trial) for trial in waiting]
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing, as nothing is held."""
 
 
 class Pool:
     """Processes of this machine, started afresh: for work that computes, such as vision.
 
     Args:
-        workers: processes; one for each processor by default.
+        workers: number of processes; by default one for each processor.
     """
 
     def __init__(self, workers: int | None = None) -> None:
@@ -102,7 +102,7 @@ class Pool:
         self.capacity = self._workers * PER_WORKER
 
     def start(self, work: Work) -> None:
-        """Make ready; the processes start with the first trials."""
+        """Get ready; the processes start with the first trials."""
         self._pool = ProcessPoolExecutor(
             self._workers,
             mp_context=multiprocessing.get_context("spawn"),
@@ -120,10 +120,10 @@ class Pool:
         try:
             self._running.add(self._pool.submit(_attempt_in_worker, trial))
         except BrokenProcessPool:
-            raise _died() from None
+            raise _pool_died_error() from None
 
     def collect(self) -> list[TrialRow]:
-        """What is done.
+        """Return the rows that are done; wait for the first.
 
         Raises:
             FormupError: a process of the pool died.
@@ -132,10 +132,10 @@ class Pool:
         try:
             return [future.result() for future in done]
         except BrokenProcessPool:
-            raise _died() from None
+            raise _pool_died_error() from None
 
     def close(self) -> None:
-        """End the processes after the trials they are at."""
+        """Stop the processes after the trials they are at."""
         self._pool.shutdown(cancel_futures=True)
 
 
@@ -144,7 +144,7 @@ class Ray:
 
     Args:
         address: of the cluster, as ray.init takes it; None starts one on this machine.
-        workers: trials at once; the cluster's processors by default.
+        workers: trials at once; by default as many as the cluster has processors.
     """
 
     capacity = 0
@@ -178,17 +178,17 @@ class Ray:
         self._running.append(self._attempt.remote(self._work, trial))
 
     def collect(self) -> list[TrialRow]:
-        """What is done."""
+        """Return the rows that are done; wait for the first."""
         done, self._running = self._ray.wait(self._running, num_returns=1, fetch_local=True)
         return list(self._ray.get(done))
 
     def close(self) -> None:
-        """Disconnect; a cluster that was started here ends."""
+        """Disconnect; a cluster that was started here is stopped."""
         self._ray.shutdown()
 
 
 def executor(name: str, workers: int | None = None) -> Executor:
-    """The executor of a name: serial, pool or ray.
+    """Return the executor of this name: serial, pool or ray.
 
     Raises:
         InputError: there is none of that name.
@@ -203,7 +203,7 @@ def executor(name: str, workers: int | None = None) -> Executor:
 
 
 _worker: list[Work] = []
-"""Of a process of the pool: what it calls."""
+"""What a process of the pool calls; empty in others."""
 
 
 def _begin_worker(work: Work) -> None:
@@ -212,7 +212,7 @@ def _begin_worker(work: Work) -> None:
 
 
 def _end_with_parent() -> None:
-    """A killed runner must not leave processes behind that wait for ever."""
+    """End with the parent: a killed runner must not leave processes behind that wait for ever."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
@@ -223,7 +223,7 @@ def _attempt_in_worker(trial: Trial) -> TrialRow:
     return attempt(_worker[0], trial)
 
 
-def _died() -> FormupError:
+def _pool_died_error() -> FormupError:
     return FormupError(
         "A process of the pool died, perhaps for want of memory. What was done is kept; run again "
         "to go on, with fewer workers."

@@ -1,8 +1,8 @@
-"""May a new version replace the old one: pass, block, or inconclusive, which is not a pass.
+"""The gate for replacing an old version: pass, block, or inconclusive, which is not a pass.
 
-Non-inferiority: it passes when it is shown to be no worse than the margin, is blocked when it is
-shown to be worse than that. "Shown" is a one-sided bound at 95 % on new tasks, for the success,
-the invalid output and the tokens alike, so that versions that are equal are hardly ever blocked.
+Non-inferiority: a version passes if it is shown to be no worse than the margin, and is blocked if
+it is shown to be worse than that. "Shown" is a one-sided bound at 95 % on new tasks, for success,
+invalid output and tokens alike, so that versions that are equal are hardly ever blocked.
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,19 @@ MARGIN = 0.05
 """Loss of success that is tolerated: a share, 5 points."""
 INVALID_MARGIN = 0.02
 TOKENS_MARGIN = 0.20
-"""Rise of the tokens that is tolerated without a gain in success."""
+"""Rise of the tokens, as a share, that is tolerated without a gain in success."""
 MUST_PASS = 0.9
 ONE_SIDED = 0.90
 """Level of an interval whose ends are one-sided bounds at 95 %."""
 NAMED = 5
-"""Tasks named in a reason."""
+"""Most tasks named in a reason."""
 
 Verdict = Literal["pass", "block", "inconclusive"]
 
 
 @dataclass(frozen=True)
 class Paired:
-    """Two versions on the same tasks, over trials that both have: row 0 the old, row 1 the new.
+    """Two versions on the same tasks, over trials that both have: row 0 is the old, row 1 the new.
 
     Attributes:
         tasks: ids, T of them.
@@ -60,7 +60,7 @@ class Rise:
 
     @property
     def words(self) -> str:
-        """The same in points."""
+        """The same as text, in points."""
         values = (self.estimate, self.low, self.high)
         estimate, low, high = (f"{round(100 * value, 1) + 0.0:+.1f}" for value in values)
         return f"{estimate} points, bounds {low} and {high}"
@@ -90,8 +90,8 @@ def gate(
 
     Args:
         margin: loss of success that is tolerated, above 0.
-        unfinished: what is wrong with the runs themselves; nothing is concluded then.
-        scale: what the score is called.
+        unfinished: what is wrong with the runs themselves; if anything, nothing is concluded.
+        scale: name of the score, for the reasons.
     """
     least = least_error(float(paired.pairs.sum()))
     success, invalid = _rise(paired.score, least), _rise(paired.invalid, least)
@@ -120,14 +120,14 @@ def gate(
 
 
 def _rise(values: FloatArray, least: float) -> Rise:
-    """Of shares, (2, T)."""
+    """Return the rise of shares, (2, T)."""
     differences = values[1] - values[0]
     found = paired_t(differences, ONE_SIDED, least)
     return Rise(float(differences.mean()), max(-1.0, found.low), min(1.0, found.high))
 
 
 def _token_rise(paired: Paired) -> tuple[float | None, bool]:
-    """The rise of the tokens, and whether it is shown to be above the margin."""
+    """Return the rise of the tokens, and whether it is shown to be above the margin."""
     before, after = paired.tokens
     if before.sum() < TINY:
         return None, False

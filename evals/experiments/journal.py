@@ -1,7 +1,7 @@
 """A run's folder: trials.jsonl, appended and synced row by row, manifest.json, and a lock.
 
-A killed run leaves whole rows and at most one torn line, which is cut off when it goes on. Rows of
-another suite or another version of formup are never mixed in.
+A killed run leaves whole rows and at most one torn line, which is cut off when it is resumed. Rows
+of another suite or another version of formup are never mixed in.
 """
 
 import os
@@ -34,10 +34,10 @@ class Manifest(BaseModel):
 
     @classmethod
     def of(cls, trials: Iterable[Trial]) -> Self:
-        """The manifest of these trials.
+        """Return the manifest of these trials.
 
         Raises:
-            InputError: no trials, or of several suites.
+            InputError: there are no trials, or they are of several suites.
         """
         suites, arms = set[str](), dict[bytes, Arm]()
         for trial in trials:
@@ -49,7 +49,7 @@ class Manifest(BaseModel):
         return cls(suite=suites.pop(), formup=version("formup"), arms=ordered)
 
     def joined(self, other: "Manifest", where: Path) -> "Manifest":
-        """With the arms of both.
+        """Return the manifest with the arms of both.
 
         Raises:
             InputError: another suite or version of formup; `where` is the folder of the other.
@@ -104,7 +104,7 @@ class Journal:
             write_whole(self._folder / HEAD, self._last.encode())
 
     def append(self, row: TrialRow) -> None:
-        """Write a row, sealed; when this returns it is on the disk."""
+        """Seal and write a row; when this returns it is on the disk."""
         row = sealed(row, self._last)
         self._file.write(row.line)
         self._file.flush()
@@ -125,7 +125,7 @@ class Journal:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """The manifest of a run's folder.
+    """Return the manifest of a run's folder.
 
     Raises:
         InputError: there is none, or it is damaged.
@@ -140,7 +140,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def read_rows(folder: Path) -> list[TrialRow]:
-    """One row for each trial of a run's folder, in order; a torn last line is left out.
+    """Return one row for each trial of a run's folder, in order; a torn last line is left out.
 
     Raises:
         InputError: no such folder, or it is damaged.
@@ -150,12 +150,12 @@ def read_rows(folder: Path) -> list[TrialRow]:
 
 
 def equal_lines(rows: Iterable[TrialRow]) -> bytes:
-    """Rows sorted, without times and host: equal for equal results, whoever ran them."""
+    """Return sorted rows without times and host: equal for equal results, whoever ran them."""
     return b"".join(row.equal_line for row in sorted(rows, key=lambda row: row.order))
 
 
 def all_rows(folder: Path) -> list[TrialRow]:
-    """All rows as written, infrastructure errors that were tried again too.
+    """Return all rows as written, with infrastructure errors that were tried again.
 
     Raises:
         InputError: a line is damaged, of another suite, or its trial is scored already.
@@ -184,10 +184,10 @@ def all_rows(folder: Path) -> list[TrialRow]:
 
 
 def merge(shards: Sequence[Path], into: Path) -> int:
-    """Put the rows of shards together in a new folder, sorted; how many trials that are.
+    """Put the rows of shards together in a new folder, sorted; return the number of trials.
 
-    A trial in several shards must have come out alike. Infrastructure errors are kept: the merged
-    folder can be gone on with.
+    A trial in several shards must have the same result in each. Infrastructure errors are kept: the
+    merged folder can be resumed.
 
     Raises:
         InputError: other suites or versions, results that contradict, rows that were edited or
@@ -198,7 +198,7 @@ def merge(shards: Sequence[Path], into: Path) -> int:
         raise InputError("A folder is named twice; merge different shards into a new folder.")
     with ExitStack() as stack:
         for folder in shards:
-            read_manifest(folder)  # before a lock makes a folder that is not there
+            read_manifest(folder)  # first, as a lock would make a folder that does not exist
             stack.enter_context(held(folder))
             check_seals(all_rows(folder), folder / ROWS)
         manifest = read_manifest(shards[0])
@@ -230,7 +230,7 @@ def merge(shards: Sequence[Path], into: Path) -> int:
 
 @contextmanager
 def held(folder: Path) -> Generator[None, None, None]:
-    """Hold a folder, which is made if there is none; the system lets go of it when we end.
+    """Lock a folder, which is made if there is none; the system unlocks it when the process ends.
 
     Raises:
         InputError: another runner holds it, or it cannot be made.

@@ -1,4 +1,4 @@
-"""Who carries tasks out, as arms of a sweep: rules, an agent, a model alone, a policy."""
+"""Methods that carry tasks out, as arms of a sweep: rules, an agent, a model alone, a policy."""
 
 import hashlib
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from .ablation import Part, tools_without
 from .coordinate_frame import PIXELS, Frame
 from .pointing import Mode, can_point
 from .rate_limiter import RateLimited, rate_limiter
-from .recordings import REPLAY, Spoken, recordings
+from .recordings import REPLAY, RecordedReplies, recordings
 from .segment_only import SEGMENT_ONLY, SegmentOnly
 from .simulated_model import SIMULATED, SimulatedModel
 from .trials import USUAL, USUAL_SEGMENTER, Arm, Trial, canonical
@@ -29,10 +29,10 @@ from .zerocap import CALLED, OBJECT, PLACES, ZEROCAP, ZeroCap
 
 METHODS = ("rules", "agent", "alone", ZEROCAP, SEGMENT_ONLY, RL, *POLICIES)
 DIRECT = "former-direct"
-"""The prompt of a model alone: to write coordinates."""
+"""The prompt of a model alone, which is told to write coordinates."""
 NO_MODEL = {"rules": "offline", **dict.fromkeys(POLICIES, "none")}
 WITH_TOOLS = ("rules", "agent")
-"""Methods that the tools place for."""
+"""Methods for which the tools place robots."""
 WRITERS = ("alone", ZEROCAP)
 """Methods whose model writes coordinates itself."""
 DESCRIBED = (*WITH_TOOLS, ZEROCAP)
@@ -41,7 +41,7 @@ EXAMPLES = {
     SEGMENT_ONLY: "langsam, a segmenter that takes text",
     RL: f"DIR, a folder that {TRAIN} --out DIR has written",
 }
-"""Models of methods that take no language model."""
+"""Examples of models for methods that take no language model."""
 SHIPPED = PromptLibrary()
 
 
@@ -51,16 +51,16 @@ class Method:
 
     Attributes:
         name: one of METHODS.
-        model: of agent and alone, as Agent takes it, `simulated`, or replay:FOLDER; of
-            segment-only a segmenter that takes text; of rl a folder of trained policies; the others
-            have their own.
-        prompt: id@vNNN, None for the current one of the model's own.
+        model: for methods with a language model as Agent takes it, `simulated`, or replay:FOLDER;
+            for segment-only a segmenter that takes text; for rl a folder of trained policies; the
+            others have their own.
+        prompt: id@vNNN, None for the current version of the method's own prompt.
         descriptor: how shapes are described.
         mode: how things are pointed at.
         planner: a second model of an agent, which plans without the picture.
-        segmenter: what cuts things out; of segment-only the model itself.
-        frame: in which one that writes coordinates alone gives them.
-        without: the part of the tools that is left out; of methods with tools.
+        segmenter: what cuts things out; for segment-only it is the model itself.
+        frame: the one in which a model that writes coordinates alone gives them.
+        without: the part of the tools that is left out, for methods with tools.
         library: where prompts are.
         base_url: of the model's server.
         rate: requests per minute in each process at most; None for no limit.
@@ -114,11 +114,11 @@ class Method:
         )
 
     def agent(self, seed: int, recording: Path | None = None) -> Agent:
-        """The agent of a trial.
+        """Return the agent of a trial.
 
         Args:
             seed: of the trial.
-            recording: the trace that is replayed, if one is.
+            recording: the trace to replay, if any.
 
         Raises:
             InputError: no such model or prompt, or one that writes no coordinates alone.
@@ -127,8 +127,8 @@ class Method:
             return Agent(SegmentOnly(self.model))
         name = self.model if recording is None else f"{REPLAY}{recording}"
         model: str | Model = SimulatedModel(seed) if name == SIMULATED else name
-        if recording is not None and self.without:  # what tools answer is not what they answered
-            model = Spoken(recording)
+        if recording is not None and self.without:  # tools no longer answer as they were recorded
+            model = RecordedReplies(recording)
         url = self.base_url if isinstance(model, str) and model != "offline" else None
         if self.name in WRITERS and name in ("offline", SIMULATED):
             raise InputError(f"{name} writes no coordinates alone; --model takes another.")
@@ -151,7 +151,7 @@ class Method:
         return agent
 
     def _zerocap(self, model: str | Model, url: str | None) -> Agent:
-        """The paper's pipeline; a recording of it has the tools' calls in it already."""
+        """Return the agent of the paper's pipeline; a recording has the tools' calls already."""
         if recordings(self.model):
             return Agent(model, tools=CALLED)
         looker = Agent(model, base_url=url).model
@@ -163,9 +163,9 @@ class Method:
         return agent
 
     def takes(self, task: Task) -> bool:
-        """Whether a task can be tried: pointed at this way, and recorded if that is replayed.
+        """Return whether a task can be tried: pointed at this way, and recorded if replayed.
 
-        Dialogues are held with what has tools.
+        Dialogues need a method with tools.
         """
         if task.dialogue is not None and self.name not in WITH_TOOLS:
             return False
@@ -178,10 +178,10 @@ class Method:
 
 
 def check_method(arm: Method) -> Method:
-    """The same method with its own model where none is given, if its parts go together.
+    """Return the method, with its own model if none is given, after checking its options.
 
     Raises:
-        InputError: there is none of its name, or it does not go with what else is given.
+        InputError: there is no method of its name, or an option does not go with it.
     """
     name = arm.name
     if name not in METHODS:
@@ -212,7 +212,7 @@ def check_method(arm: Method) -> Method:
 
 
 def trials_of(suite: str, tasks: Sequence[Task], arms: Sequence[Arm], count: int) -> list[Trial]:
-    """All trials: every task, every arm, so many tries.
+    """Return all trials: every task, every arm, so many tries.
 
     Args:
         suite: its hash.
@@ -238,7 +238,7 @@ def trials_of(suite: str, tasks: Sequence[Task], arms: Sequence[Arm], count: int
 
 
 def _prompts_sha(prompts: Sequence[Prompt]) -> str | None:
-    """Of the prompt, or of all of them where two models share the work."""
+    """Return the hash of the prompt, or of all prompts if two models share the work."""
     hashes = [prompt.sha256 for prompt in prompts]
     if len(hashes) < 2:
         return hashes[0] if hashes else None

@@ -1,8 +1,8 @@
-"""How a task's thing is pointed at: the way of pointing is a variable of an experiment.
+"""Ways of pointing at a task's thing, which are a variable of an experiment.
 
-truth: the drawn outline is the mask. box: each side off by up to 8 % of the box. outline: at most
-12 vertices, off by up to 4 % of the size (square root of the area). drawn: by hand, at one look.
-point: one well inside. words: no pointing but what a dialogue begins with, by its outline.
+truth: the annotated outline is the mask. box: each side off by up to 8 % of the box. outline: at
+most 12 vertices, off by up to 4 % of the size (square root of the area). drawn: by hand, at one
+look. point: one well inside. words: nothing, except the outlines that a dialogue begins with.
 """
 
 import json
@@ -23,21 +23,21 @@ from ..tasks.task import Task, Thing
 
 Mode = Literal["truth", "outline", "drawn", "box", "point", "words"]
 JITTERED: tuple[Mode, ...] = ("outline", "box", "point")
-"""Modes in which each trial points in another way."""
+"""Modes in which each trial points a little differently."""
 BOX_JITTER, OUTLINE_JITTER, OUTLINE_VERTICES = 0.08, 0.04, 12
 MOST_VERTICES = 30
-"""That an outline may be drawn with."""
+"""Most vertices that an outline may be drawn with."""
 
 
 class Pointing(NamedTuple):
-    """What an agent is given beside the words."""
+    """What an agent is given besides the words."""
 
     pointed: tuple[TargetPrompt, ...] = ()
     targets: tuple[Target, ...] = ()
 
 
 def mode_named(text: str) -> Mode:
-    """A mode by name.
+    """Return the mode of this name.
 
     Raises:
         InputError: there is none; the text lists those there are.
@@ -49,7 +49,7 @@ def mode_named(text: str) -> Mode:
 
 
 def can_point(task: Task, mode: Mode) -> bool:
-    """Whether a task can be pointed at this way: a single pointing settles one thing alone."""
+    """Return whether a task can be pointed at this way: one pointing settles one thing alone."""
     if task.dialogue is not None:
         return mode in ("truth", "words")
     if mode == "drawn":
@@ -60,7 +60,7 @@ def can_point(task: Task, mode: Mode) -> bool:
 
 
 def pointing(task: Task, mode: Mode, number: int) -> Pointing:
-    """How a task is pointed at in the trial of a number, which settles the jitter."""
+    """Return how a task is pointed at in the trial of a number, which determines the jitter."""
     things = task.things[: task.dialogue.given] if task.dialogue else task.things
     if mode == "words":
         shown = enumerate(things, start=1) if task.dialogue else ()
@@ -78,7 +78,7 @@ def pointing(task: Task, mode: Mode, number: int) -> Pointing:
 
 @cache
 def _drawings() -> dict[str, dict[str, Any]]:
-    """Outlines drawn by hand, by task."""
+    """Return the outlines drawn by hand, by task."""
     return json.loads((PHOTOS / "outlines/drawn.json").read_text(encoding="utf-8"))
 
 
@@ -102,13 +102,13 @@ def _jittered_box(thing: Thing, random: np.random.Generator, far: FloatArray) ->
 
 
 def _drawn_outline(thing: Thing, name: str) -> TargetPrompt:
-    """The true outline with as many vertices as can be given."""
+    """Return the true outline with as many vertices as can be given."""
     vertices = _simplified(thing, MOST_VERTICES)
     return TargetPrompt(id=name, outline=tuple((float(x), float(y)) for x, y in vertices))
 
 
 def _simplified(thing: Thing, most: int) -> FloatArray:
-    """An outline's vertices, at most so many, (n, 2) px."""
+    """Return an outline's vertices, simplified to at most so many, (n, 2) px."""
     tolerance = 0.5
     ring = LineString([*thing.polygon, thing.polygon[0]])
     vertices = shapely.get_coordinates(ring.simplify(tolerance))[:-1]
@@ -119,7 +119,7 @@ def _simplified(thing: Thing, most: int) -> FloatArray:
 
 
 def _jittered_outline(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
-    """The true outline simplified to at most 12 vertices, each moved."""
+    """Return the true outline simplified to at most 12 vertices, each moved."""
     vertices = _simplified(thing, OUTLINE_VERTICES)
     amount = OUTLINE_JITTER * thing.outline.size
     while True:  # a jitter that crosses itself is no outline a person would draw
@@ -129,7 +129,7 @@ def _jittered_outline(thing: Thing, random: np.random.Generator, far: FloatArray
 
 
 def _inner_point(thing: Thing, random: np.random.Generator, far: FloatArray) -> TargetPrompt:
-    """A random point of the thing, off its edge by an eighth of its least width if it can be."""
+    """Return a random point of the thing, if possible an eighth of its least width off its edge."""
     outline = thing.outline
     inner = outline.polygon.buffer(-outline.min_width / 8)
     region = outline.polygon if inner.is_empty else inner

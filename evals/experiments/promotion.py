@@ -1,4 +1,4 @@
-"""Whether a comparison allows one version of a prompt to take the place of another.
+"""Check whether a comparison allows one version of a prompt to replace another.
 
 A report of `formup eval compare` names the two texts it is about; it says nothing about others.
 """
@@ -14,7 +14,7 @@ from ...tools.tool import violations
 
 
 class Side(BaseModel):
-    """One of the two compared: prompt, hash of its text, the part that it was tried without."""
+    """One of the two compared: its prompt, the hash of its text, the part it was tried without."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -24,7 +24,7 @@ class Side(BaseModel):
 
 
 class Comparison(BaseModel):
-    """What a promotion needs of a report: `b` is judged against `a`."""
+    """The parts of a report that a promotion needs: `b` is judged against `a`."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -35,7 +35,7 @@ class Comparison(BaseModel):
 
 
 def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
-    """What a comparison allows a promotion for, as a changelog says it.
+    """Return the reason for which a comparison allows a promotion, as text for a changelog.
 
     Args:
         path: of the report.
@@ -43,7 +43,7 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
         promoted: must be its `b`.
 
     Raises:
-        InputError: it is no such report, is about other texts, or did not pass; all that is wrong.
+        InputError: it is no such report, is about other texts, or did not pass; the text says all.
     """
     report = _read_comparison(path)
     sides = (("a", report.a, current, "current"), ("b", report.b, promoted, "promoted"))
@@ -69,7 +69,7 @@ def passed(path: Path, current: Prompt, promoted: Prompt) -> str:
 
 
 def verdict_of(path: Path, draft: Prompt) -> tuple[str, str]:
-    """The verdict of a comparison on a draft that is to be released, alone and in a sentence.
+    """Return the verdict of a comparison on a draft that is to be released, alone and in words.
 
     Raises:
         InputError: it is no such report, or its `b` is another prompt or another text.
@@ -84,7 +84,7 @@ def verdict_of(path: Path, draft: Prompt) -> tuple[str, str]:
 
 
 def _is_named(side: Side, prompt: Prompt) -> bool:
-    """Whether a side is that prompt by its name, or by that of the draft it was released from."""
+    """Return whether a side is that prompt by name, or the draft that it was released from."""
     drafted = side.prompt.startswith(f"{prompt.id}@draft-") and side.sha256 == prompt.sha256
     return drafted or side.prompt == prompt.name
 

@@ -1,6 +1,6 @@
-"""Requests to a model no faster than its provider allows.
+"""Limits on how fast requests are sent to a model, as its provider demands.
 
-Each process has its own limit, so that a sweep divides what is allowed among its processes.
+Each process has its own limit, so a sweep divides what is allowed among its processes.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ class RateLimiter:
         self._lock = Lock()
 
     def wait(self, now: float) -> float:
-        """Take the next turn; seconds until it comes.
+        """Take the next turn; return the seconds until it comes.
 
         Args:
             now: seconds on a steady clock.
@@ -39,23 +39,23 @@ class RateLimiter:
 
 @lru_cache
 def rate_limiter(model: str, per_minute: float) -> RateLimiter:
-    """The rate limiter of a model in this process, the same one for all trials."""
+    """Return the rate limiter of a model in this process, the same one for all trials."""
     return RateLimiter(per_minute)
 
 
 class RateLimited:
-    """A model that waits for its turn before each reply; all else of it stays its own."""
+    """A model that waits for its turn before each reply; all else is passed on to it."""
 
     def __init__(self, model: Model, limiter: RateLimiter) -> None:
         self._model, self._limiter = model, limiter
 
     @property
     def name(self) -> str:
-        """Of the model."""
+        """Name of the model."""
         return self._model.name
 
     async def reply(self, request: Request) -> Reply:
-        """The model's, in its turn."""
+        """Wait for a turn, then return the model's reply."""
         await asyncio.sleep(self._limiter.wait(time.monotonic()))
         return await self._model.reply(request)
 

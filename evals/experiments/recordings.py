@@ -1,4 +1,4 @@
-"""Recorded conversations in a model's place: a folder of traces, one of each task or trial."""
+"""Recorded conversations instead of a model: a folder of traces, one of each task or trial."""
 
 import hashlib
 import re
@@ -15,12 +15,12 @@ from ...tools.errors import InputError, ModelError
 
 REPLAY = "replay:"
 NAMED = 80
-"""Characters of a task's id in the names of its files."""
+"""Most characters of a task's id in the names of its files."""
 PLAN = re.compile(r"p-[0-9a-f]{10}")
 
 
 def file_name(task: str) -> str:
-    """A task's id as the beginning of a file's name."""
+    """Return a task's id as the beginning of a file's name."""
     return re.sub(r"[^\w.-]+", "_", task)[:NAMED]
 
 
@@ -32,11 +32,11 @@ class Recordings:
 
     @property
     def name(self) -> str:
-        """Of the model that they stand for: what is in them decides."""
+        """Name of the model that they stand for, with a hash of their content."""
         return _name(self.folder)
 
     def of(self, task: str, trial: int) -> Path | None:
-        """The trace of a trial, if there is one.
+        """Return the trace of a trial, if there is one.
 
         Raises:
             InputError: there are several.
@@ -55,45 +55,45 @@ class Recordings:
 
     @property
     def staged(self) -> bool:
-        """Whether two shared the work: one looked, another planned."""
+        """Whether two models shared the work: one looked, another planned."""
         first = min(self.folder.glob("*.jsonl"), default=None)
         return first is not None and "+" in read_events(first)[0].data["model"]
 
     def seed(self, path: Path) -> int:
-        """The simulator's seed at the time, on which the tools' replies depend."""
+        """Return the simulator's seed when it was recorded, on which the tools' replies depend."""
         turn = next(event for event in read_events(path) if event.kind == "turn")
         return int(turn.data["settings"].get("seed", 0))
 
 
-class Spoken(ReplayModel):
-    """The recorded replies in turn, whatever is said in between; plans go by their new ids."""
+class RecordedReplies(ReplayModel):
+    """The recorded replies in turn, whatever is said in between; plan ids become the new ones."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         lines = [event.data for event in read_events(path) if event.kind == "message"]
-        self._said = read_messages(lines, None)
+        self._recorded = read_messages(lines, None)
 
     async def reply(self, request: Request) -> Reply:
-        """The next one.
+        """Return the next recorded reply.
 
         Raises:
-            ModelError: there is none.
+            ModelError: there is none at this place in the conversation.
         """
         count = len(request.messages)
-        said = self._said[count] if count < len(self._said) else None
-        if not isinstance(said, Reply):
+        recorded = self._recorded[count] if count < len(self._recorded) else None
+        if not isinstance(recorded, Reply):
             raise ModelError("The recorded replies fit no more.")
         named = {
             old: new
-            for then, now in zip(self._said, request.messages, strict=False)
+            for then, now in zip(self._recorded, request.messages, strict=False)
             for old, new in zip(PLAN.findall(then.text), PLAN.findall(now.text), strict=False)
         }
-        line = said.model_dump_json()
+        line = recorded.model_dump_json()
         return Reply.model_validate_json(PLAN.sub(lambda m: named.get(m[0], m[0]), line))
 
 
 def recordings(model: str) -> Recordings | None:
-    """The recordings of a folder, where a model's name is that of one."""
+    """Return the recordings of the folder that a model's name gives, or None if it gives none."""
     folder = Path(model.removeprefix(REPLAY))
     return Recordings(folder) if model.startswith(REPLAY) and folder.is_dir() else None
 

@@ -1,8 +1,8 @@
-"""Runs the trials of a sweep that its folder does not hold yet, within a budget.
+"""The runner of the trials of a sweep that its folder does not hold yet, within a budget.
 
-A trial is named by its key; a killed run is gone on with by running it again. Order: every task
-gets its first trial in every arm before any gets its second, arms side by side, so that a sweep
-that stops is balanced and a model that drifts drifts under all arms alike.
+A trial is named by its key; to resume a killed run, run it again. Order: every task gets its first
+trial in every arm before any gets its second, arms side by side, so that a sweep that stops is
+balanced and a model that drifts does so under all arms alike.
 """
 
 import re
@@ -17,12 +17,12 @@ from .journal import Journal, Manifest
 from .trials import Trial, TrialRow
 
 IN_A_ROW = 10
-"""Infrastructure errors one after the other, after which going on is of no use."""
+"""Number of consecutive infrastructure errors after which there is no point in going on."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a sweep is; `row` is the latest, None at the start."""
+    """How far a sweep has got; `row` is the latest, None at the start."""
 
     done: int
     total: int
@@ -32,7 +32,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Sweep:
-    """How a sweep ended; `stopped` says why it did before its end."""
+    """How a sweep ended; `stopped` says why it ended early, None if it did not."""
 
     scored: int
     total: int
@@ -54,15 +54,15 @@ def run_trials(
 
     Args:
         trials: of the whole sweep, in any order.
-        work: runs and grades one; the row's times and host are filled in.
+        work: runs and grades one; the executor fills in the row's times and host.
         executor: Serial by default.
-        budget_usd: over all rows of the folder. No trial starts that could exceed it if it cost
+        budget_usd: for all rows of the folder. No trial starts that would exceed it if it cost
             what the dearest of its model did; the first of a model runs alone.
         shard: i/n runs the i-th of n parts, 1/n to n/n.
         done: called at the start and after every row.
 
     Raises:
-        InputError: several suites or trials of one key, a folder of another suite or in use.
+        InputError: several suites, two trials of one key, or a folder of another suite or in use.
     """
     manifest, mine = Manifest.of(trials), part(balanced(trials), shard)
     if budget_usd is not None and not budget_usd > 0:
@@ -88,7 +88,7 @@ def run_trials(
 
 
 def balanced(trials: Iterable[Trial]) -> list[Trial]:
-    """By trial number, then task in the order given, its arms side by side and taking turns first.
+    """Order trials by number, then task as given, its arms side by side and first in turns.
 
     Raises:
         InputError: two trials have one key.
@@ -112,7 +112,7 @@ def balanced(trials: Iterable[Trial]) -> list[Trial]:
 
 
 def part(trials: Sequence[Trial], shard: str | None) -> list[Trial]:
-    """The trials of a shard i/n, chosen by their keys; all of them for None.
+    """Return the trials of a shard i/n, chosen by their keys; all of them for None.
 
     Raises:
         InputError: it is not i/n with 1 <= i <= n.
@@ -127,7 +127,7 @@ def part(trials: Sequence[Trial], shard: str | None) -> list[Trial]:
 
 
 class _Budget:
-    """What may still be spent, with what is under way reserved."""
+    """What may still be spent, with the cost of running trials reserved."""
 
     def __init__(self, budget: float | None, rows: Iterable[TrialRow]) -> None:
         self._budget = budget
@@ -137,7 +137,7 @@ class _Budget:
             self._learn(row)
 
     def allows(self, model: str, spent: float) -> bool:
-        """Whether a trial of the model may start."""
+        """Return whether a trial of the model may start."""
         if self._budget is None:
             return True
         running = {name: count for name, count in self._running.items() if count}
@@ -173,7 +173,7 @@ class _Run:
     stopped: str | None = None
 
     def through(self, executor: Executor) -> None:
-        """Run what waits until there is nothing left, or something stops it."""
+        """Run what is waiting until nothing is left, or something stops it."""
         self._start(executor)
         while self.running:
             for row in executor.collect():
@@ -181,11 +181,11 @@ class _Run:
             self._start(executor)
 
     def report(self, row: TrialRow | None) -> None:
-        """Say how far it is."""
+        """Report progress."""
         self.done(Progress(self.scored, self.total, self.journal.cost_usd, row))
 
     def _start(self, executor: Executor) -> None:
-        """Start what may start."""
+        """Start the trials that may start."""
         while self.stopped is None and self.waiting and self.running < executor.capacity:
             trial = self.waiting[0]
             if not self.budget.allows(trial.arm.model, self.journal.cost_usd):

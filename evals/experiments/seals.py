@@ -1,7 +1,7 @@
 """Seals of a run's rows: each holds a hash of itself, of the row before it and of its files.
 
-So a row or a transcript that was edited, and rows that were dropped, repeated or moved are found by
-name. It guards against slips and second thoughts; whoever recomputes all of it is not caught.
+So a row or a transcript that was edited, and rows that were dropped, repeated or moved are found
+and named. This guards against slips and second thoughts, not against recomputing all seals.
 """
 
 import hashlib
@@ -12,22 +12,22 @@ from ...tools.errors import InputError
 from .trials import TrialRow, canonical
 
 HEAD = "head"
-"""A run's file with the seal of the row that was the last when a runner ended."""
+"""The file of a run with the seal of the row that was the last when a runner ended."""
 
 
 def sealed(row: TrialRow, after: str) -> TrialRow:
-    """The row with its seal.
+    """Return the row with its seal.
 
     Args:
-        row: as it came out.
-        after: seal of the row before it; nothing for the first.
+        row: as the trial gave it.
+        after: seal of the row before it; empty for the first.
     """
     linked = row.model_copy(update={"after": after})
     return linked.model_copy(update={"seal": _seal(linked)})
 
 
 def sealed_all(rows: Iterable[TrialRow]) -> list[TrialRow]:
-    """Rows sealed anew in this order."""
+    """Return rows sealed anew in this order."""
     made, last = list[TrialRow](), ""
     for row in rows:
         made.append(sealed(row, last))
@@ -36,7 +36,7 @@ def sealed_all(rows: Iterable[TrialRow]) -> list[TrialRow]:
 
 
 def files_hash(paths: Iterable[Path]) -> str:
-    """Of the files that are there."""
+    """Return the hash of those files that exist."""
     content = hashlib.sha256()
     for path in paths:
         if path.exists():
@@ -45,7 +45,7 @@ def files_hash(paths: Iterable[Path]) -> str:
 
 
 def check_seals(rows: Sequence[TrialRow], path: Path) -> None:
-    """Hold all rows of a file to their seals.
+    """Check all rows of a file against their seals.
 
     Args:
         rows: as written, in order.

@@ -1,7 +1,7 @@
-"""Segmentation alone (Table II of the paper): a network is given the words for the thing, whole.
+"""Segmentation alone (Table II of the paper): a network is given all the words for the thing.
 
-Nobody reads a relation or a rank, or compares anything: the best find is the thing; without a
-network what stands out most is. The rules place robots about it as about what a person points at.
+No relation or rank is read, and nothing is compared: the best find is the thing, or without a
+network what stands out most. The rules then place robots as if a person had pointed at it.
 """
 
 import json
@@ -17,11 +17,11 @@ from ...tools.perception.segmenters.registry import segmenter_named
 
 SEGMENT_ONLY = "segment-only"
 LONGEST = 60
-"""Characters of a phrase that a network is asked with."""
+"""Most characters of a phrase that a network is given."""
 
 
 class SegmentOnly:
-    """A network's best find for the words, in the place of whoever would choose."""
+    """A model that takes a network's best find for the words instead of choosing a thing."""
 
     reads_all = True
 
@@ -31,7 +31,7 @@ class SegmentOnly:
         self._rules = OfflinePlanner()
 
     async def reply(self, request: Request) -> Reply:
-        """Look for the thing by its words, then have the rules go on with what was found."""
+        """Look for the thing by its words, then let the rules go on with what was found."""
         first, *rest = turn_of(request.messages)
         assert isinstance(first, User)
         if not rest:
@@ -53,14 +53,14 @@ def _call(name: str, **arguments: Any) -> Reply:
 
 
 def _phrase(text: str) -> str:
-    """The words for the thing, or all words where the rules know of none."""
+    """Return the words for the thing, or all words if the rules find none."""
     said = read_task(text).instruction
     reading = read_instruction(said)
     return (reading.things[0] if reading.things else said)[:LONGEST]
 
 
 def _best(messages: History, by_words: bool) -> str | None:
-    """The candidate that the network is surest of, or without one that stands out most."""
+    """Return the candidate that the network is surest of; without a network, the most salient."""
     result = next(m for m in messages if isinstance(m, Result) and m.call_id == SEGMENT_ONLY)
     found: list[dict[str, Any]] = []
     if not result.error:

@@ -1,8 +1,8 @@
-"""A simulated model that reads its prompt: the offline rules, which lapse without its sentences.
+"""A simulated model that reads its prompt: the offline rules, which lapse if sentences are missing.
 
-Which trials a lapse befalls is drawn from the trial's seed, so it is the same under every prompt:
-a prompt that lacks a sentence loses a known share of tasks, and a gate can be tried on that. It is
-no language model, and what it scores says nothing about one.
+Which trials lapse is drawn from the trial's seed, so it is the same under every prompt: a prompt
+that lacks a sentence loses a known share of tasks, on which a gate can be tried. It is no language
+model, and its scores say nothing about one.
 """
 
 import re
@@ -23,10 +23,10 @@ Kind = Literal[
 
 @dataclass(frozen=True)
 class Duty:
-    """A sentence, and what happens without it.
+    """A sentence that a prompt needs, and the lapse that happens without it.
 
     Attributes:
-        sentences: any of these in the prompt, letter case and line breaks aside, is enough.
+        sentences: any one of these in the prompt, letter case and line breaks aside, is enough.
         share: of trials that lapse without it.
     """
 
@@ -87,7 +87,7 @@ class SimulatedModel:
         self._rules = OfflinePlanner()
 
     async def reply(self, request: Request) -> Reply:
-        """What the rules say, less what the prompt forgot to ask for."""
+        """Return what the rules reply, with the lapses that the prompt leaves room for."""
         reply = await self._rules.reply(request)
         first = request.messages[0]
         assert isinstance(first, User)
@@ -99,7 +99,7 @@ class SimulatedModel:
 
 
 def lapses_of(prompt: str, seed: int) -> set[Kind]:
-    """What goes wrong in a trial under a prompt."""
+    """Return what goes wrong in a trial under a prompt."""
     text = re.sub(r"\s+", " ", prompt.lower())
     random = np.random.default_rng([seed, 7])
     drawn = random.random(len(DUTIES))

@@ -1,7 +1,7 @@
-"""Runs a trial of a suite, grades it, and keeps what came of it; another process can be given it.
+"""The work on a trial of a suite: run, grade and store it; another process can be given it.
 
-A provider that fails is an infrastructure error and says nothing; output that cannot be used is the
-model's failure, counted apart.
+A provider that fails is an infrastructure error and says nothing about the model; output that
+cannot be used is the model's failure, counted separately.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ from ..grading.grades import VERSION, Graded
 from ..grading.policies import POLICIES, positions
 from ..rl.policy import RL, places
 from ..tasks.task import Dialogue, Task
-from .dialogue_work import Held, hold
+from .dialogue_work import DialogueRecord, hold
 from .methods import WRITERS, Method
 from .pointing import Pointing, pointing
 from .recordings import file_name, recordings
@@ -34,7 +34,7 @@ from .trials import Status, Trial, TrialRow, Turns, canonical
 from .written import declined, written_positions
 
 LONGEST = 400
-"""Characters of feedback in a row."""
+"""Most characters of feedback in a row."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class SuiteWork:
     Attributes:
         tasks: by id.
         pictures: files, by the task's id.
-        arms: by the name of what a trial says of its arm.
-        attempts: a folder for what was planned and observed, for looking and grading again; None
-            where only scores are to be seen.
+        arms: methods by the name of the arm in a trial.
+        attempts: a folder for what was planned and observed, for viewing and grading again; None
+            if only scores may be seen.
     """
 
     tasks: Mapping[str, Task]
@@ -55,7 +55,7 @@ class SuiteWork:
     attempts: Path | None = None
 
     def __call__(self, trial: Trial) -> TrialRow:
-        """The row of a trial."""
+        """Run and grade a trial, and return its row."""
         task, arm = self.tasks[trial.task], self.arms[trial.arm.name]
         if task.dialogue is not None:
             return self._dialogue(task, task.dialogue, arm, trial)
@@ -88,7 +88,7 @@ class SuiteWork:
         )
 
     def _run(self, task: Task, arm: Method, trial: Trial) -> tuple[Run, dict[str, Any]]:
-        """The run of a trial and what it cost."""
+        """Return the run of a trial and what it cost."""
         agent, settings, shown, trace = self._begin(task, arm, trial)
         run = agent.run(
             _picture(self.pictures[task.id]),
@@ -101,7 +101,7 @@ class SuiteWork:
         return run, _cost([run], agent, arm)
 
     def _dialogue(self, task: Task, dialogue: Dialogue, arm: Method, trial: Trial) -> TrialRow:
-        """The row of a dialogue: it succeeds if every turn does; gcr is the share of those."""
+        """Return the row of a dialogue: it succeeds if every turn does; gcr is their share."""
         agent, settings, shown, trace = self._begin(task, arm, trial)
         picture = _picture(self.pictures[task.id])
         held = hold(agent, picture, task, settings, shown, trace)
@@ -133,13 +133,13 @@ class SuiteWork:
         )
 
     def _kept(self, trial: Trial) -> str | None:
-        """The hash of what is kept of a trial that was written down; None where nothing is."""
+        """Return the hash of the files stored of a trial; None if nothing is stored."""
         return self.attempts and files_hash(attempt_files(self.attempts, trial))
 
     def _begin(
         self, task: Task, arm: Method, trial: Trial
     ) -> tuple[Agent, Settings, Pointing, Path | None]:
-        """Who carries a trial out, what the person fixes and points at, where it is written."""
+        """Return a trial's agent, its settings, what is pointed at, and the file of its trace."""
         seed, recording, recorded = trial.seed, None, recordings(arm.model)
         if recorded and (recording := recorded.of(task.id, trial.trial)):
             seed = recorded.seed(recording)
@@ -158,18 +158,18 @@ class SuiteWork:
 
 
 def attempt_name(trial: Trial) -> str:
-    """The name of what came of a trial: its positions (.json) and its trace (.jsonl)."""
+    """Return the name of a trial's files: its result (.json) and its trace (.jsonl)."""
     return f"{file_name(trial.task)}-{trial.trial}-{trial.key[:12]}"
 
 
 def attempt_files(folder: Path, trial: Trial) -> tuple[Path, Path]:
-    """Where what came of a trial is kept, if it is, and its trace, if there is one."""
+    """Return the paths of a trial's result and of its trace, whether or not they exist."""
     name = attempt_name(trial)
     return folder / f"{name}.json", folder / f"{name}.jsonl"
 
 
 def _by_policy(task: Task, arm: Method, trial: Trial) -> Attempt:
-    """Where nothing is to be placed, a policy moves robots all the same."""
+    """Return the attempt of a policy, which moves robots even if nothing is to be placed."""
     placed = [(0.0, 0.0)]
     if arm.name == RL:
         found = places(Path(arm.model), task.category, task.goals, trial.trial, trial.seed)
@@ -204,7 +204,7 @@ def _attempt(run: Run, arm: Method) -> Attempt:
 
 
 def _lost(run: Run) -> str | None:
-    """Why a run says nothing about the model, if so: somebody else has failed."""
+    """Return why a run says nothing about the model, if something else has failed."""
     outcome = run.outcome
     if isinstance(outcome, Stopped) and outcome.kind in ("model", "tool", "fleet"):
         return f"{outcome.kind}: {outcome.reason}"[:LONGEST]
@@ -212,7 +212,7 @@ def _lost(run: Run) -> str | None:
 
 
 def _invalid(run: Run, arm: Method, attempt: Attempt) -> bool:
-    """Whether there is nothing to judge: no call that could be made, no positions to be read."""
+    """Return whether there is nothing to judge: no call that could be made, no positions."""
     if attempt.observed is not None or attempt.declined:
         return False
     if arm.name in WRITERS:
@@ -222,7 +222,7 @@ def _invalid(run: Run, arm: Method, attempt: Attempt) -> bool:
 
 
 def _cost(runs: Sequence[Run], agent: Agent, arm: Method) -> dict[str, Any]:
-    """Tokens as the provider counts them, else by rule of thumb; rules take none.
+    """Return tokens as the provider counts them, else by rule of thumb; rules take none.
 
     Args:
         runs: one, or all turns of a dialogue.
@@ -258,8 +258,8 @@ def _write(path: Path, attempt: Attempt, graded: Graded, run: Run | None) -> Non
     write_whole(path, canonical(content))
 
 
-def _write_dialogue(path: Path, held: Held, dialogue: Dialogue) -> None:
-    """In the form of an attempt, with what stands at the end, and all turns beside it."""
+def _write_dialogue(path: Path, held: DialogueRecord, dialogue: Dialogue) -> None:
+    """Write a dialogue in the form of an attempt: the state at its end, and all turns beside it."""
     last = held.states[-1]
     problems = summary(held.grades, dialogue.turns)
     content = {

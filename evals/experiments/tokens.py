@@ -1,9 +1,9 @@
-"""What a conversation costs in tokens, counted alike whoever answered it.
+"""The cost of a conversation in tokens, counted in the same way whoever answered it.
 
-Text: four characters a token, a rule of thumb that leaves no provider's tokenizer out. Pictures: as
-Anthropic bills them, width times height / 750 after the long side is brought down to 1,568 px
-(their guide to vision, 2026). Every request is paid whole, or with its prompt and tools at the
-tenth that is paid for what the cache holds.
+Text: four characters per token, a rule of thumb for any provider's tokenizer. Pictures: as
+Anthropic bills them, width times height / 750 after the long side is scaled down to 1,568 px
+(their guide to vision, 2026). Each request is paid in full, or with its prompt and tools at a
+tenth, the price of what is in the cache.
 """
 
 import json
@@ -20,7 +20,8 @@ from ...tools.tool import Tool
 
 CHARACTERS, PIXELS, LONG = 4, 750, 1568
 CACHED, CACHEABLE = 0.1, 1024
-"""Price of a token read from the cache, and the shortest prefix that is kept (Anthropic, 2026)."""
+"""Price of a token read from the cache as a share, and the shortest prefix that is cached, tokens
+(Anthropic, 2026)."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Spent:
     """Requests made, and tokens over all of them.
 
     Attributes:
-        cached: input in tokens of full price, where the prompt and the tools were in the cache.
+        cached: input in tokens of full price, if the prompt and the tools were in the cache.
     """
 
     requests: int
@@ -38,7 +39,7 @@ class Spent:
 
 
 def spent(messages: History, system: str = "", tools: Sequence[Tool] = ()) -> Spent:
-    """What all the replies of a conversation have cost.
+    """Return what all the replies of a conversation have cost.
 
     Args:
         messages: the conversation.
@@ -63,12 +64,12 @@ def _offered(tools: tuple[Tool, ...]) -> int:
 
 
 def text_tokens(text: str) -> int:
-    """Tokens of a text."""
+    """Return the tokens of a text."""
     return math.ceil(len(text) / CHARACTERS)
 
 
 def picture_tokens(width: int, height: int) -> int:
-    """Tokens of a picture of so many pixels."""
+    """Return the tokens of a picture of this size, px."""
     factor = min(1.0, LONG / max(width, height))
     return math.ceil(width * factor * height * factor / PIXELS)
 

@@ -1,4 +1,4 @@
-"""Which tools a prompt was released for: their descriptions may have changed since."""
+"""The tools a prompt was released for, whose descriptions may have changed since."""
 
 import hashlib
 import json
@@ -11,7 +11,7 @@ from ...tools.tool import Tool
 
 
 def tool_hashes(prompt: Prompt, tools: tuple[Tool, ...] = TOOLS) -> dict[str, str]:
-    """Hashes of the descriptions and schemas of the tools offered with a prompt, by name."""
+    """Return hashes of the descriptions and schemas of the tools offered with a prompt, by name."""
     offered = [t for t in tools if not prompt.tools or t.name in prompt.tools]
     return {tool.name: _hash(tool) for tool in offered}
 
@@ -19,7 +19,7 @@ def tool_hashes(prompt: Prompt, tools: tuple[Tool, ...] = TOOLS) -> dict[str, st
 def retooled(
     library: PromptLibrary, prompt: Prompt, tools: tuple[Tool, ...] = TOOLS
 ) -> list[Finding]:
-    """Tools that are not what they were when a prompt was released, or are none."""
+    """Return findings on tools that have changed since a prompt was released, or do not exist."""
     unknown = sorted(set(prompt.tools) - {t.name for t in tools})
     found = [
         Finding(prompt.name, "tools", "warning", f"It names {name}, which is no tool of formup.")

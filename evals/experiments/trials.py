@@ -1,7 +1,7 @@
-"""A trial and what came of it: the key that names it, its seed, its line in trials.jsonl.
+"""A trial and its result: the key that names it, its seed, its line in trials.jsonl.
 
 Everything a result depends on is in the key: a changed prompt, suite or tool schema makes other
-trials. Infrastructure errors (a provider was down) are kept apart from failures: never scored.
+trials. Infrastructure errors (such as a provider that is down) are no failures: never scored.
 """
 
 import hashlib
@@ -18,9 +18,9 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Status = Literal["pass", "fail", "model_invalid", "infra_error"]
 USUAL = "edges"
-"""The descriptor that goes without saying."""
+"""The default descriptor, which is left out of names."""
 USUAL_SEGMENTER = "grabcut"
-"""So for what cuts things out, which needs no weights."""
+"""The default for what cuts things out, which needs no weights."""
 UNEQUAL = frozenset({"seconds", "host", "files", "after", "seal"})
 """Fields that differ from run to run of the same trial: times, and hashes of what has times."""
 
@@ -30,15 +30,15 @@ class Arm(BaseModel):
 
     Attributes:
         method: who decides, such as agent or alone.
-        prompt: id@vNNN, None for rules that read none.
+        prompt: id@vNNN; None for rules, which read none.
         sha256: of the prompt's text.
         tools: SHA-256 of the schemas of the tools offered.
         model: provider:name, or offline.
-        descriptor: how shapes are put into words, such as edges; None where none are.
-        mode: how things are pointed at; words where they are not.
+        descriptor: how shapes are put into words, such as edges; None if none are.
+        mode: how things are pointed at; words if they are not.
         segmenter: what cuts things out; None for the usual one.
-        frame: in which coordinates were written; None for pixels.
-        without: the part that was left out; None for the whole.
+        frame: the one in which coordinates were written; None for pixels.
+        without: the part of the tools that was left out; None for the whole.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -56,7 +56,7 @@ class Arm(BaseModel):
 
     @property
     def name(self) -> str:
-        """Method, prompt with the beginning of its hash, model; the others if unusual."""
+        """Method, prompt with the beginning of its hash, model; other fields only if unusual."""
         prompt = f" {self.prompt}#{(self.sha256 or '')[:12]}" if self.prompt else ""
         shapes = f" {self.descriptor}" if self.descriptor not in (None, USUAL) else ""
         mode = "" if self.mode == "words" else f" {self.mode}"
@@ -73,7 +73,7 @@ class Trial(BaseModel):
         trial: number of the try, from 0.
         category, setup, style: of the task, such as caging, hidden, fresh; results are also shown
             by each.
-        must_pass: the task is one that always succeeds.
+        must_pass: whether the task is one that always succeeds.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -94,13 +94,13 @@ class Trial(BaseModel):
 
     @cached_property
     def seed(self) -> int:
-        """For all chance in the trial, 63 bits; the same in every arm, which pairs their luck."""
+        """Seed of all randomness in the trial, 63 bits; equal in every arm, to pair their luck."""
         named = canonical([self.suite, self.task, self.trial])
         return int.from_bytes(hashlib.sha256(named).digest()[:8], "big") >> 1
 
     @property
     def order(self) -> tuple[Any, ...]:
-        """By task, trial, then arm: the order of compared results."""
+        """Sort key by task, trial, then arm: the order of compared results."""
         return (self.task, self.trial, self.arm.name, self.key)
 
 
@@ -112,7 +112,7 @@ class Turns(BaseModel):
 
     Attributes:
         right: turns in which all was right.
-        still: those that were to change nothing; `kept` of them did.
+        still: those that were to change nothing; `kept` of them did so.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -124,21 +124,21 @@ class Turns(BaseModel):
 
 
 class TrialRow(Trial):
-    """A trial with what came of it.
+    """A trial with its result.
 
     Attributes:
         outcome: status the run ended with, such as deployed or question.
-        sr: success; None for an infrastructure error, as gcr and strict.
+        sr: success; None for an infrastructure error, as are gcr and strict.
         gcr: goal conditions recall, the share of robots that stand right.
         strict: success at the tighter tolerances.
         object_correct: whether it was about the right thing; None if that was not graded.
-        iou: overlap of the best outline measured with the true one; None where none was.
-        e95: how near 95 % of its boundary and the true one lie, see `grading.grades`.
+        iou: overlap of the best outline measured with the true one; None if none was.
+        e95: how near 95 % of its boundary and of the true one lie, see `grading.grades`.
         feedback: what was wrong, in a sentence.
         cached_tokens: input in tokens of full price, with the prompt and the tools in the cache.
         turns: of a dialogue, whose gcr is the share of them that were right; else None.
-        files: hash of what is kept of it in attempts/; None where nothing is.
-        after, seal: see seals.py; nothing until it is written.
+        files: hash of what is stored of it in attempts/; None if nothing is.
+        after, seal: see seals.py; empty until it is written.
     """
 
     status: Status
@@ -164,7 +164,7 @@ class TrialRow(Trial):
 
     @classmethod
     def of(cls, trial: Trial, status: Status, **facts: Any) -> Self:
-        """The row of a trial; `sr` follows from the status."""
+        """Make the row of a trial; `sr` follows from the status."""
         success = None if status == "infra_error" else status == "pass"
         return cls(**trial.model_dump(include=_FIELDS), status=status, sr=success, **facts)
 
@@ -190,15 +190,15 @@ class TrialRow(Trial):
 
     @property
     def line(self) -> bytes:
-        """As written: one line of JSON, keys sorted, ASCII."""
+        """The row as it is written: one line of JSON, keys sorted, ASCII."""
         return canonical(self.model_dump()) + b"\n"
 
     @property
     def equal_line(self) -> bytes:
-        """The line without times and host: equal wherever and however it was run."""
+        """The line without `UNEQUAL` fields such as times: the same however it was run."""
         return canonical(self.model_dump(exclude=set(UNEQUAL))) + b"\n"
 
 
 def canonical(value: object) -> bytes:
-    """JSON that is equal for equal values."""
+    """Return JSON that is equal for equal values."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()

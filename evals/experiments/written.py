@@ -1,4 +1,4 @@
-"""What a model wrote that writes coordinates itself: positions, or that none shall be placed."""
+"""Reading what a model that writes coordinates wrote: positions, or that none are to be placed."""
 
 import json
 from typing import Any, Literal
@@ -9,7 +9,7 @@ Positions = tuple[tuple[float, float], ...]
 
 
 def json_object(text: str) -> dict[str, Any]:
-    """The last JSON object of a text, which may have thoughts before it; empty without one."""
+    """Return the last JSON object of a text, which may begin with thoughts; empty without one."""
     found: dict[str, Any] = {}
     start, decoder = text.find("{"), json.JSONDecoder()
     while start >= 0:
@@ -22,7 +22,7 @@ def json_object(text: str) -> dict[str, Any]:
 
 
 def written_positions(text: str) -> Positions | None:
-    """The positions written as JSON; None if there are none that can be read."""
+    """Return the positions written as JSON; None if there are none that can be read."""
     try:
         pairs = np.asarray(json_object(text)["positions"], dtype=float)
     except (ValueError, KeyError, TypeError):
@@ -33,7 +33,7 @@ def written_positions(text: str) -> Positions | None:
 
 
 def declined(text: str) -> Literal["question", "impossible"] | None:
-    """What has been done by writing that no robot shall be placed; else None."""
+    """Return whether placing no robot was a question or a refusal; None if it is neither."""
     written = json_object(text)
     if written.get("positions") != []:
         return None

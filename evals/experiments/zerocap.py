@@ -1,7 +1,7 @@
-"""ZeroCAP as the paper has it, as a model around two: object and pattern, mask, shape, coordinates.
+"""ZeroCAP as in the paper, as one model around two: object and pattern, mask, shape, coordinates.
 
-Code calls the two tools between them. No contract, no certificate and no second try: what the
-planner writes is where robots are sent. A mask below the threshold ends it, as in the paper.
+Code calls the two tools between the models. There is no contract, no certificate and no second
+try: robots are sent where the planner writes. A mask below the threshold ends it, as in the paper.
 """
 
 import json
@@ -17,21 +17,21 @@ ZEROCAP = "zerocap"
 OBJECT, PLACES = "zerocap-object", "zerocap-places"
 """The prompts of the two stages."""
 CALLED = tuple(tool for tool in TOOLS if tool.name in ("segment", "describe_shape"))
-TOLD = ("Robots", "Picture", "Metres per pixel")
-"""What of the first message the planner is given as it is."""
+PLANNER_LINES = ("Robots", "Picture", "Metres per pixel")
+"""Lines of the first message that the planner is given unchanged."""
 INSUFFICIENT = json.dumps({"positions": [], "reason": "Insufficient segmentation accuracy."})
 LONGEST = 60
-"""Characters of a phrase that a network is asked with."""
+"""Most characters of a phrase that a network is given."""
 
 
 class ZeroCap:
-    """A model that sees and one that writes coordinates.
+    """A model that sees, combined with one that writes coordinates.
 
     Args:
         looker: is given the picture and the person's words.
-        planner: is given pattern, number of robots and shape, no picture.
+        planner: is given the pattern, the number of robots and the shape, but no picture.
         look: the looker's prompt.
-        place: the planner's.
+        place: the planner's prompt.
         by_text: whether the segmenter is given the object's name; else the looker's box.
     """
 
@@ -45,7 +45,7 @@ class ZeroCap:
         self._by_text = by_text
 
     async def reply(self, request: Request) -> Reply:
-        """The looker's, then a call of each tool, then the planner's."""
+        """Return the looker's reply, then a call of each tool, then the planner's reply."""
         first, *rest = turn_of(request.messages)
         if not rest:
             seen = await self._looker.reply(Request(self._look.render(), (first,), ()))
@@ -64,12 +64,12 @@ class ZeroCap:
         looked = rest[0]
         assert isinstance(looked, Reply)
         pattern = json.dumps(json_object(looked.text).get("pattern"), ensure_ascii=False)
-        facts = [line for line in first.text.split("\n") if line.partition(":")[0] in TOLD]
-        told = User(text="\n".join([f"Pattern: {pattern}", *facts, f"Shape: {last.text}"]))
-        return await self._planner.reply(Request(self._place.render(), (told,), ()))
+        facts = [line for line in first.text.split("\n") if line.partition(":")[0] in PLANNER_LINES]
+        message = User(text="\n".join([f"Pattern: {pattern}", *facts, f"Shape: {last.text}"]))
+        return await self._planner.reply(Request(self._place.render(), (message,), ()))
 
     async def aclose(self) -> None:
-        """Close what either keeps open."""
+        """Close what either model keeps open."""
         for model in {id(m): m for m in (self._looker, self._planner)}.values():
             close = getattr(model, "aclose", None)
             if close is not None:

@@ -1,5 +1,5 @@
-"""Graders: what a formation is worth, as success, as a share of robots, and in a sentence.
+"""Graders: they judge a formation by success, by a share of robots, and in a sentence.
 
-Beside the rule of the photographs (photo_rules.py), which says yes or no, these say how much is
-right (the paper's GCR), by rules that make GCR = 1 and success the same thing. No model judges.
+The share of robots is the paper's GCR; the rules make GCR = 1 the same as success. No model
+judges.
 """

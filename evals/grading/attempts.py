@@ -1,4 +1,4 @@
-"""Grades an attempt at a task: all its goals, or that robots rightly stayed where they were."""
+"""Grading of an attempt at a task: of all its goals, or that robots rightly stayed put."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ from .lines import centre, corners, line_between, side
 from .ring import escape_proof, ring
 
 SAME = 0.5
-"""Overlap (intersection over union) above which an outline found is the thing meant."""
+"""Overlap (intersection over union) above which an outline found is taken for the thing meant."""
 Rule = Callable[[Goal, FloatArray, NDArray[np.bool_]], Part]
-"""Judges a goal with its rule, by positions, (m, 2) px, and which can be right at all, (m,)."""
+"""Judges a goal by its rule, given positions, (m, 2) px, and which can be right at all, (m,)."""
 RULES: dict[str, Rule] = {
     "boundary": ring,
     "cage": escape_proof,
@@ -36,17 +36,17 @@ RULES: dict[str, Rule] = {
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of a task.
+    """The result of a task.
 
     Attributes:
         status: how the run ended.
-        planned: positions commanded, (m, 2) px; None for none.
-        observed: positions read back after the move; None where nothing has moved.
-        found: outlines robots were placed about; none where that is not known.
+        planned: positions commanded, (m, 2) px; None if there are none.
+        observed: positions read back after the move; None if nothing has moved.
+        found: outlines robots were placed about; none if that is not known.
         measured: all outlines that were measured.
         message: the text the run ended with.
-        declined: a question or a refusal was made the way the interface has for it. Words alone
-            are none: nobody can tell them from a reply that went wrong.
+        declined: whether a question or a refusal was made in the way the interface has for it.
+            Words alone do not count: they cannot be told from a reply that went wrong.
     """
 
     status: Status
@@ -66,7 +66,7 @@ def grade_goals(goals: Sequence[Goal], positions: ArrayLike | None) -> Graded:
 
     Args:
         goals: one or more, on one picture.
-        positions: (m, 2) px; None where nothing was placed.
+        positions: (m, 2) px; None if nothing was placed.
     """
     points = _point_array(positions)
     if points is None or not len(points):
@@ -105,13 +105,13 @@ def grade_goals(goals: Sequence[Goal], positions: ArrayLike | None) -> Graded:
 
 
 def grade_attempt(goals: Sequence[Goal], expects: Sequence[Status], attempt: Attempt) -> Graded:
-    """Grade what came of a task; the observed positions are the official ones.
+    """Grade the result of a task; the observed positions are the official ones.
 
     Args:
-        goals: of the task; none where nothing is to be placed.
-        expects: statuses that are right; where `deployed` is not among them, robots that moved are
-            a failure whatever the message.
-        attempt: what came of it.
+        goals: of the task; none if nothing is to be placed.
+        expects: statuses that are right; if `deployed` is not among them, robots that moved are a
+            failure whatever the message.
+        attempt: the result.
     """
     if "deployed" not in expects:
         return _graded_refusal(expects, attempt)
@@ -136,7 +136,7 @@ def grade_attempt(goals: Sequence[Goal], expects: Sequence[Status], attempt: Att
 
 
 def _outlined(thing: Thing, measured: Sequence[Polygon]) -> tuple[float | None, float | None]:
-    """The overlap of the best outline with a thing, and its boundary error."""
+    """Return the overlap of the best outline with a thing, and its boundary error."""
     if not measured:
         return None, None
     best = max(measured, key=thing.overlap)
@@ -158,7 +158,7 @@ def _graded_refusal(expects: Sequence[Status], attempt: Attempt) -> Graded:
 
 
 def _point_array(positions: ArrayLike | None) -> FloatArray | None:
-    """Positions as an array; what is no number stands nowhere."""
+    """Return positions as an array (m, 2); those that are not finite are put far outside."""
     if positions is None:
         return None
     points = np.asarray(positions, dtype=float).reshape(-1, 2)
@@ -166,7 +166,7 @@ def _point_array(positions: ArrayLike | None) -> FloatArray | None:
 
 
 def _robots_of_goals(goals: Sequence[Goal], points: FloatArray) -> list[NDArray[np.intp]]:
-    """The robots of each goal by least total distance to its target; the last gets those over."""
+    """Return the robots of each goal by least total distance; the last goal gets the surplus."""
     if len(goals) == 1:
         return [np.arange(len(points))]
     slots = [i for i, goal in enumerate(goals) for _ in range(goal.robots)]
@@ -179,7 +179,7 @@ def _robots_of_goals(goals: Sequence[Goal], points: FloatArray) -> list[NDArray[
 
 
 def _meant(found: Sequence[Polygon], things: Sequence[Thing]) -> bool:
-    """Whether the outlines found are those of the things meant, in any order."""
+    """Return whether the outlines found are those of the things meant, in any order."""
     return len(found) == len(things) and any(
         all(thing.overlap(outline) > SAME for outline, thing in zip(found, order, strict=True))
         for order in permutations(things)

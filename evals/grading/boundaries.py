@@ -1,4 +1,4 @@
-"""How far the boundary of an outline lies from the true one: what a clearance feels of it."""
+"""The error of an outline's boundary, which is what matters for a clearance."""
 
 import numpy as np
 import shapely
@@ -7,13 +7,13 @@ from shapely.geometry.base import BaseGeometry
 from ...tools.geometry.outline import FloatArray, distances
 
 SPACING = 0.5
-"""Of the points of a boundary whose distances are taken, px."""
+"""Spacing of the points of a boundary whose distances are taken, px."""
 
 
 def boundary_error(found: BaseGeometry, truth: BaseGeometry) -> float:
-    """e95: the larger of the two directions' 95 % quantiles of the distance between boundaries.
+    """Return e95: the larger 95 % quantile of the distances from either boundary to the other.
 
-    As a share of the square root of the true area, 1 at most, for regions in px.
+    It is a share of the square root of the true area, 1 at most, for regions in px.
     """
     one, other = found.boundary, truth.boundary
     apart = (distances(other, _along(one)), distances(one, _along(other)))

@@ -1,6 +1,6 @@
-"""Whether a task can be trusted: a right answer scores 1, answers without understanding do not.
+"""Check that a task can be trusted: a right answer scores 1, one without understanding does not.
 
-A wrong truth is found out late and by everybody at once; this finds it before a task is used.
+Wrong ground truth is noticed late and by everybody at once; this finds it before a task is used.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from .reference_answers import reference
 
 
 def check_task(task: Task) -> list[str]:
-    """What is wrong with a task, as sentences; none if it holds."""
+    """Return what is wrong with a task, as sentences; none if it can be trusted."""
     if not task.goals:
         return []
     try:
@@ -22,7 +22,7 @@ def check_task(task: Task) -> list[str]:
         return [f"{task.id}: no right answer could be placed: {error}"]
     graded = grade_goals(task.goals, placed)
     problems = [] if graded.sr else [f"{task.id}: a right answer fails: {graded.feedback}."]
-    crowd = sum(goal.robots for goal in task.goals) > 1  # of one, finding the thing may be all
+    crowd = sum(goal.robots for goal in task.goals) > 1  # one robot may only have to find the thing
     for name in POLICIES:
         if crowd and scores(name, task.goals)[0] == 1:
             problems.append(f"{task.id}: the policy {name}, which understands nothing, succeeds.")

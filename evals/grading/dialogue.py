@@ -1,7 +1,7 @@
-"""Grades a turn of a dialogue: whether it was right to act, ask or only answer, and what changed.
+"""Grading of a dialogue's turn: whether it was right to act, ask or only answer; what changed.
 
-States are compared as they stand, robots by their ids, on true outlines; no sentence is judged but
-by the numbers and names in it. What a turn was to leave alone must be as it was, to the plan's id.
+States are compared on true outlines, robots by their ids; sentences are judged only by the numbers
+and names in them. What a turn was to leave alone must be unchanged, down to the plan's id.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,26 +24,26 @@ STATUSES: Mapping[str, tuple[Status, ...]] = {
     "refuse": ("question", "impossible", "answered"),
     "go": ("deployed",),
 }
-"""By what is expected of a turn: a new plan, a change of the one that stands, an earlier one, words
-alone, a question, a sentence that says why not, motion."""
+"""Right statuses by what is expected of a turn: a new plan, a change of the current one, an earlier
+one, words alone, a question, a sentence that says why not, motion."""
 STILL = ("answer", "ask", "refuse")
 """Turns that change nothing."""
 BACK = "turn"
-"""Names the turn whose plan stands again."""
+"""Key of the turn whose plan becomes the current one again."""
 LONGEST = 300
-"""Characters of what is wrong with a turn."""
+"""Most characters of what is wrong with a turn."""
 ARRIVED = 2.0
-"""Observed this near to its place, px."""
+"""A robot observed this near to its place, px, has arrived."""
 
 
 @dataclass(frozen=True)
 class TurnGrade:
-    """A turn, judged.
+    """The grade of a turn.
 
     Attributes:
-        problems: what is wrong; none where it is right.
+        problems: what is wrong; none if it is right.
         still: whether it was to leave everything alone.
-        kept: whether it did; true where it was not to.
+        kept: whether nothing was changed that it was to leave alone.
     """
 
     problems: tuple[str, ...]
@@ -63,7 +63,7 @@ def grade_turn(turn: Turn, case: Case) -> TurnGrade:
     if after.status not in wanted:
         said = f"{after.status}, {' or '.join(wanted)} was right: {after.message}"
         return TurnGrade((*changed, said), still, kept)
-    problems = [*changed, *_by_kind(turn, case)]
+    problems = [*changed, *_expectation_problems(turn, case)]
     if not problems:
         problems = [
             p
@@ -81,7 +81,7 @@ def _changes(before: State, after: State) -> Iterator[str]:
         yield "robots have other places than before"
 
 
-def _by_kind(turn: Turn, case: Case) -> Iterator[str]:
+def _expectation_problems(turn: Turn, case: Case) -> Iterator[str]:
     before, after, checks = case.before, case.after, turn.checks
     if turn.expect in STILL:
         if not after.message.strip():
@@ -90,23 +90,26 @@ def _by_kind(turn: Turn, case: Case) -> Iterator[str]:
     if after.plan_id is None:
         yield "there is no plan"
         return
-    yield from _sound(case)
+    yield from _placement_problems(case)
     if turn.expect == "go":
         if after.plan_id != before.plan_id:
             yield f"another plan was driven to than {before.plan_id}"
-        if after.observed is None or _off(after.observed, before.positions) > ARRIVED:
+        if after.observed is None or _largest_offset(after.observed, before.positions) > ARRIVED:
             yield "robots were not observed at the places of the plan"
     elif turn.expect == "back":
         then = case.past[int(checks[BACK])]
         if after.plan_id != then.plan_id or not same_places(after, then):
             yield f"the plan is not that of turn {checks['turn']}, {then.plan_id}"
     else:
-        yield from _new(turn.expect, case, {"robots", "ids", "leave"} & checks.keys())
+        yield from _new_plan_problems(turn.expect, case, {"robots", "ids", "leave"} & checks.keys())
 
 
-def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
-    """What holds of every new plan; an edit is of one that stood (a correction may be of an earlier
-    one) and keeps robots' ids."""
+def _new_plan_problems(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
+    """Yield what is wrong with a new plan.
+
+    An edit must be of a plan that stood (a correction may be of an earlier one) and keep the ids of
+    robots.
+    """
     before, after = case.before, case.after
     if after.plan_id == before.plan_id:
         yield "the plan is the same as before"
@@ -120,7 +123,7 @@ def _new(expect: str, case: Case, counted: set[str]) -> Iterator[str]:
         yield f"the robots are {', '.join(after.robots)}, not {', '.join(before.robots)}"
 
 
-def _sound(case: Case) -> Iterator[str]:
+def _placement_problems(case: Case) -> Iterator[str]:
     points, (width, height) = case.after.positions, case.size
     if not len(points):
         yield "nobody is placed"
@@ -132,14 +135,14 @@ def _sound(case: Case) -> Iterator[str]:
         yield "two robots share a place"
 
 
-def _off(observed: FloatArray, places: FloatArray) -> float:
+def _largest_offset(observed: FloatArray, places: FloatArray) -> float:
     if observed.shape != places.shape:
         return np.inf
     return float(np.linalg.norm(observed - places, axis=1).max())
 
 
 def summary(grades: Sequence[TurnGrade], turns: Sequence[Turn]) -> str:
-    """What was wrong turn by turn, a line each."""
+    """Return what was wrong, one line for each turn that was."""
     pairs = enumerate(zip(turns, grades, strict=True), start=1)
     return "".join(
         f"\n  turn {i} {turn.words!r}: {'; '.join(grade.problems)[:LONGEST]}"

@@ -1,4 +1,4 @@
-"""Whether the numbers that a sentence must hold are in it, each worked out on true outlines."""
+"""Check that a sentence has the numbers it must have, each computed on true outlines."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -15,10 +15,11 @@ PX, SHARE = 3.0, 0.15
 
 
 def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
-    """What the message must hold.
+    """Yield what the message lacks of what it must contain.
 
-    number: it; robots: how many there are; distance: how far a robot is from its thing; gap: the
-    widest; nearest: the robot nearest to a thing; closed: yes or no; words: these, in any case.
+    number: that number; robots: how many there are; distance: how far a robot is from its thing;
+    gap: the widest; nearest: the robot nearest to a thing; closed: yes or no; words: these, in
+    upper or lower case.
     """
     text = case.after.message
     numbers = [float(n.replace(",", "")) for n in _NUMBER.findall(text)]
@@ -36,7 +37,8 @@ def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
         else:
             length = _lengths(case, name, value)
             if not any(
-                _is(told, length, case.scale, exact=name not in LENGTHS) for told in numbers
+                _matches(number, length, case.scale, exact=name not in LENGTHS)
+                for number in numbers
             ):
                 yield f"{length:.1f} is not in {text!r}"
 
@@ -44,13 +46,13 @@ def says(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
 LENGTHS = ("distance", "gap")
 
 
-def _is(told: float, right: float, scale: float | None, *, exact: bool) -> bool:
-    """Whether a number is the one wanted: a length in px, or in metres where there is a scale."""
+def _matches(number: float, right: float, scale: float | None, *, exact: bool) -> bool:
+    """Return whether a number is the right one: a length in px, or in metres if there's a scale."""
     if exact:
-        return abs(told - right) < 1e-6
-    near = [abs(told - right) <= max(PX, SHARE * right)]
+        return abs(number - right) < 1e-6
+    near = [abs(number - right) <= max(PX, SHARE * right)]
     if scale is not None:
-        near.append(abs(told - right * scale) <= max(PX * scale, SHARE * right * scale))
+        near.append(abs(number - right * scale) <= max(PX * scale, SHARE * right * scale))
     return any(near)
 
 
@@ -64,6 +66,6 @@ def _lengths(case: Case, name: str, value: Any) -> float:
 
 
 def _nearest(case: Case, thing: str) -> list[str]:
-    """Robots that are nearest to a thing, ties within the slack of an outline."""
+    """Return the robots nearest to a thing, with ties within the slack of an outline."""
     far = distances_to(case.things[thing], case.after.positions)
     return [r for r, d in zip(case.after.robots, far, strict=True) if d <= np.min(far) + PX]

@@ -1,8 +1,8 @@
-"""What a turn of a dialogue must have changed and what not, by names that suites use.
+"""Checks of what a dialogue's turn must and must not have changed, by the names suites use.
 
-A check is given the turn and what a suite wants of it, and says what is wrong. Lengths are px of
-the picture on true outlines, with slack for outlines that were measured: a robot's place is held
-against the truth, not against what the method took for it.
+A check is given the turn and what a suite wants of it, and yields what is wrong. Lengths are px of
+the picture on true outlines, with slack for outlines that were measured: a robot's place is
+compared with the truth, not with what the method took for it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,8 +15,8 @@ from ...tools.geometry.outline import FloatArray
 from .dialogue_answers import says
 from .dialogue_forms import (
     angle_off,
-    arranged,
     box_direction,
+    form_problems,
     gaps_around,
     neighbour_distance,
     way_of,
@@ -31,47 +31,47 @@ EVEN = (0.4, 1.6)
 SIDE = {"left": 180.0, "right": 0.0, "top": -90.0, "bottom": 90.0}
 """Directions in the picture, degrees clockwise from the right."""
 ON_SIDE, OFF_SIDE = 60.0, 30.0
-"""How far off the middle of a side, degrees, in which a thing's box is a square, a robot is still
-on it, and how near it is not off it."""
+"""How far off the middle of a side, degrees, with the thing's box stretched to a square, a robot is
+still on it; and within how many it is not off it."""
 FACING = 40.0
 SCATTER = 2.0
-"""Standard deviation of distances that may come about, px, or SHARE of the mean."""
+"""How much the standard deviation of distances may grow, px, or by SHARE of the mean."""
 MEANS = {"further": (1.08, 1e9), "closer": (0.0, 0.93), "same": (0.93, 1.07)}
-"""Ratios of mean distances."""
+"""Bounds of the mean distance over that before."""
 SPREADS = {"wider": (1.03, 1e9), "tighter": (0.0, 0.97), "same": (0.95, 1.05)}
 
 
 def _numbered(wanted: Any, all_of: Sequence[str]) -> list[str]:
-    """Robots by number, or all of them."""
+    """Return the ids of robots given by number, or of all."""
     return list(all_of) if wanted == "all" else [str(name) for name in wanted]
 
 
 def robots(case: Case, wanted: int | str) -> Iterator[str]:
-    """So many in all, `more`, `fewer` or `any`; who was there keeps its id as far as may be."""
+    """Check for so many robots, `more`, `fewer` or `any`; those from before keep their ids."""
     count, was = len(case.after.robots), len(case.before.robots)
     right = {"more": count > was, "fewer": count < was, "any": True}
     if not right.get(str(wanted), count == wanted):
         yield f"{count} robots after {was}, not {wanted}"
-    elif len(case.kept) < min(was, count):
-        yield f"only {len(case.kept)} robots kept their ids"
+    elif len(case.remaining) < min(was, count):
+        yield f"only {len(case.remaining)} robots kept their ids"
 
 
 def ids(case: Case, wanted: Sequence[int]) -> Iterator[str]:
-    """Exactly these robots."""
+    """Check that there are exactly these robots."""
     if {str(name) for name in wanted} != set(case.after.robots):
         yield f"the robots are {', '.join(case.after.robots)}, not {', '.join(map(str, wanted))}"
 
 
 def leave(case: Case, wanted: Sequence[int]) -> Iterator[str]:
-    """These are gone, and nobody else."""
+    """Check that these robots are gone, and no others."""
     gone = set(case.before.robots) - set(case.after.robots)
     if gone != {str(name) for name in wanted}:
         yield f"{', '.join(sorted(gone)) or 'nobody'} left, not {', '.join(map(str, wanted))}"
 
 
 def stay(case: Case, wanted: Any) -> Iterator[str]:
-    """These have not moved: numbers, or all that were there before and still are."""
-    for name in _numbered(wanted, case.kept):
+    """Check that robots have not moved: those given, or all that were and still are there."""
+    for name in _numbered(wanted, case.remaining):
         if name not in case.after.at:
             yield f"robot {name} is gone"
         elif (far := float(np.linalg.norm(case.moved(name)))) > UNMOVED:
@@ -79,16 +79,16 @@ def stay(case: Case, wanted: Any) -> Iterator[str]:
 
 
 def move(case: Case, wanted: Sequence[int]) -> Iterator[str]:
-    """These have moved and nobody else."""
+    """Check that these robots have moved, and no others."""
     moving = [str(name) for name in wanted]
-    yield from stay(case, [name for name in case.kept if name not in moving])
+    yield from stay(case, [name for name in case.remaining if name not in moving])
     for name in moving:
-        if name not in case.kept or float(np.linalg.norm(case.moved(name))) <= UNMOVED:
+        if name not in case.remaining or float(np.linalg.norm(case.moved(name))) <= UNMOVED:
             yield f"robot {name} was to move"
 
 
 def at(case: Case, wanted: Mapping[int, Sequence[float]]) -> Iterator[str]:
-    """These robots are at points (x, y) px."""
+    """Check that robots are at points (x, y) px."""
     for number, place in wanted.items():
         here = case.after.at.get(str(number))
         if here is None or float(np.linalg.norm(here - np.asarray(place))) > PX + UNMOVED:
@@ -96,9 +96,9 @@ def at(case: Case, wanted: Mapping[int, Sequence[float]]) -> Iterator[str]:
 
 
 def shift(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
-    """Robots went `by` [dx, dy], or `towards` a side, degrees or a thing, by `least` px or more."""
-    for name in _numbered(wanted.get("robots", "all"), case.kept):
-        if name not in case.kept:
+    """Check that robots went `by` [dx, dy], or `towards` a side, degrees or a thing, `least` px."""
+    for name in _numbered(wanted.get("robots", "all"), case.remaining):
+        if name not in case.remaining:
             yield f"robot {name} is gone"
             continue
         way = case.moved(name)
@@ -116,9 +116,9 @@ def shift(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
 
 
 def swap(case: Case, wanted: Sequence[int]) -> Iterator[str]:
-    """Two robots have each other's place; nobody else moved."""
+    """Check that two robots have each other's place, and no others moved."""
     a, b = (str(name) for name in wanted)
-    yield from stay(case, [name for name in case.kept if name not in (a, b)])
+    yield from stay(case, [name for name in case.remaining if name not in (a, b)])
     for one, other in ((a, b), (b, a)):
         here, there = case.after.at.get(one), case.before.at.get(other)
         if here is None or there is None or float(np.linalg.norm(here - there)) > UNMOVED:
@@ -126,7 +126,7 @@ def swap(case: Case, wanted: Sequence[int]) -> Iterator[str]:
 
 
 def target(case: Case, wanted: Any) -> Iterator[str]:
-    """All robots are about a thing, or so many about each: {t1: 4, t2: 4}."""
+    """Check that all robots are about a thing, or so many about each: {t1: 4, t2: 4}."""
     counts = {name: len(robots) for name, robots in case.owners(case.after).items()}
     wish = {wanted: len(case.after.robots)} if isinstance(wanted, str) else wanted
     if counts != wish:
@@ -134,11 +134,11 @@ def target(case: Case, wanted: Any) -> Iterator[str]:
 
 
 def distance(case: Case, wanted: Any) -> Iterator[str]:
-    """Of robots from the thing they are about.
+    """Check the distance of robots from the thing they are about.
 
-    `further`, `closer`, `same` in the mean; `times` [low, high] the mean before, `more` or `less`
-    by px; each robot `px` or `m` exactly, `least` or `most`. A ring stays one: distances that were
-    equal are not scattered.
+    The mean: `further`, `closer`, `same`, `times` [low, high] that before, `more` or `less` by px.
+    Each robot: exactly `px` or `m`, `least` or `most`. A ring must stay one: distances that were
+    equal must not be scattered.
     """
     after, before = case.distances(case.after), case.distances(case.before)
     mean, was = float(after.mean()), float(before.mean()) if len(before) else 0.0
@@ -171,7 +171,7 @@ def _distance_is(after: FloatArray, was: float, name: str, value: Any, scale: fl
 
 
 def spacing(case: Case, wanted: Any) -> Iterator[str]:
-    """Mean distance to the nearest neighbour: `wider`, `tighter`, `same`, `times`, `px`."""
+    """Check the mean distance to the nearest robot: `wider`, `tighter`, `same`, `times`, `px`."""
     now, was = neighbour_distance(case.after), neighbour_distance(case.before)
     wish: Mapping[str, Any] = {"times": SPREADS[wanted]} if isinstance(wanted, str) else wanted
     for name, value in wish.items():
@@ -185,7 +185,7 @@ def spacing(case: Case, wanted: Any) -> Iterator[str]:
 
 
 def even(case: Case, wanted: Any) -> Iterator[str]:
-    """Robots about each thing are evenly spaced; `open`: but for one wide gap."""
+    """Check that robots about each thing are evenly spaced; `open`: except for one wide gap."""
     for thing, points in case.rings():
         arcs = gaps_around(thing, points).arcs
         if wanted == "open":
@@ -196,7 +196,7 @@ def even(case: Case, wanted: Any) -> Iterator[str]:
 
 
 def closed(case: Case, wanted: bool) -> Iterator[str]:
-    """The ring about each thing has no gap wider than an even one, or has one."""
+    """Check that the ring about each thing has no gap wider than an even one, or that it has."""
     for thing, points in case.rings():
         gaps = gaps_around(thing, points)
         whole = gaps.winds and float(gaps.arcs.max()) <= EVEN[1] * float(gaps.arcs.mean())
@@ -205,7 +205,7 @@ def closed(case: Case, wanted: bool) -> Iterator[str]:
 
 
 def opening(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
-    """The widest gap is `towards` a side, degrees or a thing, and `least`, `most` px wide."""
+    """Check that the widest gap is `towards` a side, degrees or thing; `least`, `most` px wide."""
     for thing, points in case.rings():
         gaps = gaps_around(thing, points)
         widest = int(gaps.arcs.argmax())
@@ -224,7 +224,7 @@ def opening(case: Case, wanted: Mapping[str, Any]) -> Iterator[str]:
 
 
 def gap(case: Case, wanted: str) -> Iterator[str]:
-    """The widest gap is `wider` or `narrower` than before."""
+    """Check that the widest gap is `wider` or `narrower` than before."""
     wide = [
         max(
             float(gaps_around(case.things[name], np.array([s.at[r] for r in robots])).chords.max())
@@ -237,7 +237,7 @@ def gap(case: Case, wanted: str) -> Iterator[str]:
 
 
 def escape_proof(case: Case, wanted: bool) -> Iterator[str]:
-    """Robots certainly hold the thing they are about."""
+    """Check that robots certainly hold the thing they are about, or that they do not."""
     for thing, points in case.rings():
         state = cage(thing.outline.filled, points).state
         if (state == "caged") != wanted:
@@ -245,7 +245,7 @@ def escape_proof(case: Case, wanted: bool) -> Iterator[str]:
 
 
 def side(case: Case, wanted: str) -> Iterator[str]:
-    """All are on a side of the thing they are about, or on half of the way round: `left half`."""
+    """Check that all are on a side of their thing, or on half of the way round it: `left half`."""
     name, _, half = wanted.partition(" ")
     for thing, points in case.rings():
         off = angle_off(box_direction(thing, points), SIDE[name])
@@ -254,7 +254,7 @@ def side(case: Case, wanted: str) -> Iterator[str]:
 
 
 def without(case: Case, wanted: str) -> Iterator[str]:
-    """Nobody is on a side of the thing."""
+    """Check that no robot is on a side of the thing."""
     for thing, points in case.rings():
         off = angle_off(box_direction(thing, points), SIDE[wanted])
         if (off < OFF_SIDE).any():
@@ -262,8 +262,8 @@ def without(case: Case, wanted: str) -> Iterator[str]:
 
 
 def turned(case: Case, wanted: Sequence[float]) -> Iterator[str]:
-    """Robots went about the thing, or their own middle, by [low, high] degrees clockwise."""
-    names = case.kept
+    """Check that robots turned about the thing or their middle by [low, high] degrees clockwise."""
+    names = case.remaining
     now, was = (np.array([s.at[name] for name in names]) for s in (case.after, case.before))
     angles = list[float]()
     for about in (was.mean(0), *(t.outline.centre for t, _ in case.rings())):
@@ -276,7 +276,7 @@ def turned(case: Case, wanted: Sequence[float]) -> Iterator[str]:
 
 
 def mirrored(case: Case, wanted: str) -> Iterator[str]:
-    """The form is the mirror image of the one before, `left-right` or `top-bottom`."""
+    """Check that the form is the mirror image of the one before, `left-right` or `top-bottom`."""
     was, now = case.before.positions, case.after.positions
     flip = np.array([-1.0, 1.0] if wanted == "left-right" else [1.0, -1.0])
     image, here = (was - was.mean(0)) * flip, now - now.mean(0)
@@ -287,7 +287,7 @@ def mirrored(case: Case, wanted: str) -> Iterator[str]:
 
 
 def size(case: Case, wanted: Sequence[float]) -> Iterator[str]:
-    """The formation is [low, high] times as large as before."""
+    """Check that the formation is [low, high] times as large as before."""
     now, was = (
         float(np.sqrt(((s.positions - s.positions.mean(0)) ** 2).sum(1).mean()))
         for s in (case.after, case.before)
@@ -297,12 +297,15 @@ def size(case: Case, wanted: Sequence[float]) -> Iterator[str]:
 
 
 def form(case: Case, wanted: str) -> Iterator[str]:
-    """inside, around, corners, centre of each thing; between t1 and t2; line, circle by itself."""
-    return arranged(case, wanted)
+    """Check the form: inside, around, corners, centre of each thing; between two; line, circle."""
+    return form_problems(case, wanted)
 
 
 def heading(case: Case, wanted: Any) -> Iterator[str]:
-    """Robots look `towards` their thing, `away` from it, to another one, or so many degrees."""
+    """Check that robots look `towards` their thing, `away`, to another, or so many degrees.
+
+    None: they must have no headings.
+    """
     looks = case.after.headings
     if not looks or any(value is None for value in looks):
         if wanted is not None:
@@ -321,7 +324,7 @@ def heading(case: Case, wanted: Any) -> Iterator[str]:
 
 
 def kept_off(case: Case, wanted: str) -> Iterator[str]:
-    """A thing is kept clear of: named as such, and nobody stands on it."""
+    """Check that a thing is kept clear: it is named as kept off, and no robot stands on it."""
     thing = case.things[wanted]
     if not any(thing.overlap(outline) > 0.4 for outline in case.after.kept_off):
         yield f"the {thing.name} is not kept off"

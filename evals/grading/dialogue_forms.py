@@ -1,4 +1,4 @@
-"""Geometry of a formation about a true outline: gaps on the way round, directions, arrangements."""
+"""Geometry of a formation about a true outline: gaps around it, directions, arrangements."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from shapely.geometry import Polygon
 from ...tools.geometry.outline import FloatArray
 from ..tasks.task import Thing
 from .dialogue_states import Case, State, distances_to
-from .slots import matched
+from .slots import match_slots
 
 SIDES = {"left": (-1, 0), "right": (1, 0), "top": (0, -1), "bottom": (0, 1)}
 GATHERED = 0.5
-"""Robots at a centre are no further from it than this share of the thing's size."""
+"""Robots at a centre are at most this share of the thing's size away from it."""
 CORNER, BORDER = 0.35, 1.5
-"""A robot is at a corner as near as this share of the size; so near, px, it is still inside."""
+"""A robot is at a corner within this share of the size; within so many px it is still inside."""
 
 
 @dataclass(frozen=True)
 class Gaps:
-    """Gaps between neighbours on the way round a thing.
+    """Gaps between neighbours around a thing.
 
     Attributes:
-        arcs: length of each along the line they stand on, px.
+        arcs: length of each along the line that robots stand on, px.
         chords: from robot to robot, px.
-        middles: a point of the way in the middle of each, (n, 2) px.
+        middles: the point of that line in the middle of each, (n, 2) px.
         winds: whether the robots go round the thing.
     """
 
@@ -39,7 +39,7 @@ class Gaps:
 
 
 def gaps_around(thing: Thing, points: FloatArray) -> Gaps:
-    """The gaps of a ring; stations are taken along the outline at the robots' mean distance."""
+    """Return the gaps of a ring, measured along the outline at the robots' median distance."""
     far = float(np.median(distances_to(thing, points)))
     hull = Polygon(thing.polygon)
     way = hull.buffer(max(far, 1.0)).exterior
@@ -59,7 +59,10 @@ def gaps_around(thing: Thing, points: FloatArray) -> Gaps:
 
 
 def way_of(towards: Any, case: Case, here: ArrayLike) -> float:
-    """A direction named by a side, a thing seen from here, or degrees clockwise from the right."""
+    """Return the direction, degrees clockwise from the right, of a side or of a thing from here.
+
+    Degrees are returned as they are.
+    """
     if towards in SIDES:
         x, y = SIDES[towards]
     elif towards in case.things:
@@ -70,20 +73,20 @@ def way_of(towards: Any, case: Case, here: ArrayLike) -> float:
 
 
 def angle_off(ways: FloatArray, degrees: float) -> Any:
-    """How far ways (..., 2) are off a direction, degrees, 0 to 180."""
+    """Return how far vectors (..., 2) are off a direction, degrees, 0 to 180."""
     angle = np.degrees(np.arctan2(ways[..., 1], ways[..., 0]))
     return abs((angle - degrees + 180) % 360 - 180)
 
 
 def box_direction(thing: Thing, points: FloatArray) -> FloatArray:
-    """Where points are seen from a thing's middle, its box drawn out to a square, (n, 2)."""
+    """Return points seen from a thing's middle, its box stretched to a square of side 2, (n, 2)."""
     x0, y0, x1, y1 = thing.outline.bounds
     middle, half = np.array([x0 + x1, y0 + y1]) / 2, np.array([x1 - x0, y1 - y0]) / 2
     return (points - middle) / half
 
 
 def neighbour_distance(state: State) -> float:
-    """Mean distance of a robot to the nearest other, px; 0 for one alone."""
+    """Return the mean distance of a robot to the nearest other, px; 0 for a single one."""
     points = state.positions
     if len(points) < 2:
         return 0.0
@@ -91,18 +94,18 @@ def neighbour_distance(state: State) -> float:
     return float((apart + np.eye(len(points)) * 1e9).min(axis=1).mean())
 
 
-def arranged(case: Case, form: str) -> Iterator[str]:
-    """What keeps robots from standing inside, around, at the corners, ... of their things."""
+def form_problems(case: Case, form: str) -> Iterator[str]:
+    """Yield what keeps robots from standing inside, around, at the corners, ... of their things."""
     if form in BY_THEMSELVES:
         yield from BY_THEMSELVES[form](case)
         return
     for thing, points in case.rings():
-        problem = _wrong(form, thing, points)
+        problem = _form_problem(form, thing, points)
         if problem:
             yield f"{problem} of the {thing.name}: the form {form} is wanted"
 
 
-def _wrong(form: str, thing: Thing, points: FloatArray) -> str:
+def _form_problem(form: str, thing: Thing, points: FloatArray) -> str:
     off = distances_to(thing, points)
     if form == "inside":
         return f"{int((off > BORDER).sum())} robots are out" if (off > BORDER).any() else ""
@@ -116,12 +119,12 @@ def _wrong(form: str, thing: Thing, points: FloatArray) -> str:
     if form == "around":
         return "" if gaps_around(thing, points).winds else "robots do not go round the middle"
     box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(thing.region))[:4]
-    held = set(matched(points, box, CORNER * thing.outline.size).tolist()) - {-1}
+    held = set(match_slots(points, box, CORNER * thing.outline.size).tolist()) - {-1}
     return "" if len(held) >= min(4, len(points)) else f"robots are at {len(held)} corners"
 
 
 def _line_held(case: Case) -> Iterator[str]:
-    """A straight one."""
+    """Yield a problem unless robots stand in a straight line."""
     about = case.after.positions - case.after.positions.mean(0)
     along, across = (about @ np.linalg.svd(about, full_matrices=False)[2].T).T[:2]
     off = float(abs(across).max())
@@ -147,4 +150,4 @@ def _between(case: Case) -> Iterator[str]:
 
 
 BY_THEMSELVES = {"between": _between, "line": _line_held, "circle": _circle}
-"""Forms that are not about each thing by itself."""
+"""Forms that are not judged for each thing separately."""

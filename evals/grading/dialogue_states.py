@@ -1,6 +1,6 @@
-"""What stands after a turn of a dialogue, and a turn with all that it is judged by.
+"""The state after a turn of a dialogue, and a turn with all that it is judged by.
 
-Robots go by their ids, things by t1, t2, ... in the order in which they were pointed at.
+Robots are named by their ids, things t1, t2, ... in the order in which they were pointed at.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,12 +21,12 @@ UNMOVED = 1.0
 
 @dataclass(frozen=True)
 class State:
-    """What stands after a turn.
+    """The state after a turn.
 
     Attributes:
         robots: their ids.
         positions: of each, (n, 2) px.
-        headings: degrees clockwise from the right, None for any; empty where none are kept.
+        headings: degrees clockwise from the right, None for any; empty if there are none.
         observed: where robots were seen after a motion in this turn, (n, 2) px; None for no motion.
         kept_off: outlines no robot may enter.
     """
@@ -44,12 +44,12 @@ class State:
 
     @cached_property
     def at(self) -> dict[str, FloatArray]:
-        """The place of each robot by its id."""
+        """The position of each robot by its id."""
         return dict(zip(self.robots, self.positions, strict=True))
 
 
 NOTHING = State("answered")
-"""Before anything was said."""
+"""The state before anything was said."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Case:
     Attributes:
         past: the state before the first turn and after each one before this.
         after: the state after this turn.
-        scale: metres per pixel; None where there are none.
+        scale: metres per pixel; None if not known.
     """
 
     past: Sequence[State]
@@ -74,16 +74,16 @@ class Case:
         return self.past[-1]
 
     @cached_property
-    def kept(self) -> list[str]:
+    def remaining(self) -> list[str]:
         """Ids of robots that were there before and still are."""
         return [name for name in self.before.robots if name in self.after.at]
 
     def moved(self, name: str) -> FloatArray:
-        """How a robot's place has changed, (2,) px."""
+        """Return how far a robot has moved, (2,) px."""
         return self.after.at[name] - self.before.at[name]
 
     def owners(self, state: State) -> dict[str, list[str]]:
-        """The robots nearest to each thing, by the things' ids; none for one nobody is nearest."""
+        """Return the robots nearest to each thing by its id; things with none are left out."""
         far = np.stack([distances_to(t, state.positions) for t in self.things.values()])
         found: dict[str, list[str]] = {name: [] for name in self.things}
         for robot, thing in zip(state.robots, far.argmin(axis=0), strict=True):
@@ -91,11 +91,11 @@ class Case:
         return {name: robots for name, robots in found.items() if robots}
 
     def distances(self, state: State) -> FloatArray:
-        """How far each robot is from the thing nearest to it, (n,) px; 0 inside."""
+        """Return how far each robot is from the thing nearest to it, (n,) px; 0 inside."""
         return np.stack([distances_to(t, state.positions) for t in self.things.values()]).min(0)
 
     def rings(self) -> Iterator[tuple[Thing, FloatArray]]:
-        """Each thing with the places of the robots nearest to it."""
+        """Yield each thing with the positions of the robots nearest to it."""
         for name, robots in self.owners(self.after).items():
             yield self.things[name], np.array([self.after.at[robot] for robot in robots])
 
@@ -103,18 +103,18 @@ class Case:
 def case_of(
     dialogue: Dialogue, past: Sequence[State], after: State, scale: float | None = None
 ) -> Case:
-    """A turn of a dialogue with all it is judged by."""
+    """Return a turn of a dialogue with all it is judged by."""
     things = {f"t{i}": thing for i, thing in enumerate(dialogue.things, start=1)}
     return Case(past, after, things, dialogue.size, scale)
 
 
 def same_places(a: State, b: State) -> bool:
-    """Whether the same robots stand where they stood."""
+    """Return whether the same robots stand in the same places in both states."""
     return set(a.robots) == set(b.robots) and all(
         float(np.linalg.norm(a.at[name] - b.at[name])) <= UNMOVED for name in a.robots
     )
 
 
 def distances_to(thing: Thing, points: FloatArray) -> FloatArray:
-    """How far points are from what a thing covers, (n,) px; 0 inside."""
+    """Return how far points are from what a thing covers, (n,) px; 0 inside."""
     return np.asarray(shapely.distance(thing.region, shapely.points(points)), dtype=float)

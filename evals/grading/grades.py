@@ -1,7 +1,7 @@
-"""What a grader finds: of one goal robot by robot, and of a whole attempt as a value.
+"""Grades: of one goal robot by robot, and of a whole attempt.
 
 GCR, goal conditions recall, is divided by the larger of the robots asked for and the positions
-given, so that robots too many cost as much as robots too few.
+given, so that too many robots cost as much as too few.
 """
 
 from collections.abc import Mapping
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ...tools.geometry.outline import FloatArray
 
 VERSION = 1
-"""Of all graders together; part of a suite's hash, so that a changed rule is another suite."""
+"""Version of all graders together; part of a suite's hash, so a changed rule is another suite."""
 STRICT_SHARE = 2 / 3
 """Strict: the share of a tolerance that may be used."""
 STRICT_SPREAD = 1.25
-"""Strict and inside: spacing this much wider, coverage this much closer than the rule's."""
+"""Strict, inside: how many times wider the spacing and closer the coverage than the rule's."""
 EVEN = 0.25
 """Strict: how far off its even place along a loop or line a robot may stand, as share of a gap."""
 APART = 2.0
@@ -26,11 +26,11 @@ APART = 2.0
 
 @dataclass(frozen=True)
 class Part:
-    """One goal, judged.
+    """The judgement of one goal.
 
     Attributes:
         right: whether each robot stands where it may, (m,).
-        whole: share of what the robots shall do together that is done, such as cover a region.
+        whole: share done of what the robots must do together, such as cover a region.
         problems: what is wrong, the worst first.
         strict_problems: what is wrong at the tighter tolerances only.
         measures: lengths in px, shares without a unit.
@@ -43,30 +43,30 @@ class Part:
     measures: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def success(self, robots: int) -> bool:
-        """All of so many robots are right, and together they do what they shall."""
+        """Return whether all of so many robots are right and together do what they must."""
         return len(self.right) == robots and bool(self.right.all()) and not self.problems
 
     def hits(self, robots: int) -> float:
-        """Robots that count, at most one fewer than asked for where anything is wrong."""
+        """Return how many robots count: at most one fewer than asked for if anything is wrong."""
         counted = min(float(self.right.sum()), self.whole * robots)
         return counted if self.success(robots) else min(counted, robots - 1.0)
 
 
 @dataclass(frozen=True)
 class Graded:
-    """An attempt, graded.
+    """The grade of an attempt.
 
     Attributes:
         sr: success: every robot is right.
-        gcr: goal conditions recall, 0 to 1; 1 exactly where sr.
+        gcr: goal conditions recall, 0 to 1; 1 exactly if sr.
         strict: success at the tighter tolerances.
-        object_correct: whether it was about the thing meant; None where that is not known.
-        iou: overlap of the best outline that was measured with the first thing's true one; None
-            where none was.
-        e95: of that outline: 95 % of either boundary lie so near to the other one, as a share of
-            the square root of the true area.
+        object_correct: whether it was about the thing meant; None if that is not known.
+        iou: overlap of the best outline that was measured with the first thing's true one; None if
+            none was.
+        e95: of that outline: distance within which 95 % of either boundary lie of the other, as a
+            share of the square root of the true area.
         feedback: what was wrong, in a sentence.
-        measures: of all goals, named after them where there are several.
+        measures: of all goals, numbered by goal if there are several.
         right: whether each robot graded stands right, in the order given.
     """
 
@@ -82,6 +82,6 @@ class Graded:
 
 
 def distinct(points: FloatArray) -> NDArray[np.bool_]:
-    """Which of (m, 2) points stand in a place of their own: the first of those that share one."""
+    """Return which of (m, 2) points count, (m,): of those that share a place, only the first."""
     apart = np.linalg.norm(points[:, None] - points[None], axis=2) < APART
     return ~np.tril(apart, -1).any(axis=1)

@@ -1,7 +1,7 @@
 """Infill: robots inside, apart from each other, and no part of the region far from all of them.
 
-Robots inside alone would credit a straight line in one arm of an L; the covered share would
-credit a crowd with one robot in every part. The lesser of the two counts.
+To count robots inside would credit a straight line in one arm of an L; to count the covered share
+would credit a crowd with one robot in every part. The lesser of the two counts.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ def infill(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge an infill by `min_clearance_px`, `min_spacing_px` and `max_uncovered_px`.
 
     A robot is right if it stands deep enough inside and belongs to a set of robots that are far
-    enough apart, chosen as large as choosing the least crowded first makes it.
+    enough apart; the set is made large by choosing the least crowded first.
     """
     rule, target = goal.success, goal.target.region
     sign = np.where(shapely.contains_xy(target, points), 1.0, -1.0)
@@ -51,7 +51,7 @@ def infill(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 
 
 def separated(points: FloatArray, allowed: NDArray[np.bool_], spacing: float) -> NDArray[np.bool_]:
-    """A large set of allowed points no two of which are nearer than the spacing, (m,)."""
+    """Return a large set of allowed points, no two of which are nearer than the spacing, (m,)."""
     near = np.linalg.norm(points[:, None] - points[None], axis=2) < spacing
     near &= allowed[:, None] & allowed[None]
     np.fill_diagonal(near, False)
@@ -68,7 +68,7 @@ def separated(points: FloatArray, allowed: NDArray[np.bool_], spacing: float) ->
 def cells_within(
     region: BaseGeometry, bounds: tuple[float, float, float, float], step: float
 ) -> FloatArray:
-    """Points of a grid over bounds, `step` apart, that lie within a region, (n, 2), px."""
+    """Return points of a grid over bounds, `step` apart, that lie within a region, (n, 2), px."""
     x0, y0, x1, y1 = bounds
     columns, rows = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
     cells = np.stack([columns.ravel(), rows.ravel()], axis=1)
@@ -76,5 +76,5 @@ def cells_within(
 
 
 def _bareness(cells: FloatArray, points: FloatArray) -> FloatArray:
-    """Distance of the region's cells to the nearest point, px."""
+    """Return the distance of the region's cells to the nearest point, px."""
     return np.asarray(nearest(points, cells, 1)[0], dtype=float).reshape(len(cells))

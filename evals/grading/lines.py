@@ -1,4 +1,4 @@
-"""Corners, one side, a line between two things, a centre: each robot against its place."""
+"""Rules for corners, one side, a line between two things, a centre: robots against their places."""
 
 import numpy as np
 import shapely
@@ -8,34 +8,34 @@ from shapely.geometry import LineString, Polygon
 from ...tools.geometry.outline import FloatArray, distances
 from ..tasks.task import Goal
 from .grades import EVEN, STRICT_SHARE, Part
-from .slots import even_along, matched
+from .slots import even_along, match_slots
 
 OFF = 0.1
-"""Strict: how far off the target a robot stands at a corner, as a share of the tolerance."""
+"""Strict: least distance of a robot at a corner from the target, as a share of the tolerance."""
 
 
 def corners(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge one robot at each of `points`, outside the target."""
+    """Judge whether one robot is at each of the rule's `points`, outside the target."""
     rule = goal.success
     slots, most = np.asarray(rule["points"], dtype=float), rule["tolerance_px"]
     near = distances(goal.target.region, points)
     stands = free & (near > 0) & (near >= rule.get("min_clearance_px", 0))
     held = np.full(len(points), -1, dtype=np.intp)
-    held[stands] = matched(points[stands], slots, most)
+    held[stands] = match_slots(points[stands], slots, most)
     problems = list[str]()
     empty = len(slots) - int((held >= 0).sum())
     if empty:
         problems.append(f"{empty} of {len(slots)} corners without a robot within {most} px")
     if (near <= 0).any():
         problems.append(f"{int((near <= 0).sum())} on the target")
-    strictly = matched(points[stands & (near >= OFF * most)], slots, STRICT_SHARE * most)
+    strictly = match_slots(points[stands & (near >= OFF * most)], slots, STRICT_SHARE * most)
     short = len(slots) - int((strictly >= 0).sum())
     strict = (f"{short} corners not held within {STRICT_SHARE * most:.0f} px",) if short else ()
     return Part(held >= 0, 1.0, tuple(problems), strict)
 
 
 def side(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge a row on one side by `band_px` and `min_span_frac`."""
+    """Judge a row on one side by the rule's `band_px` and `min_span_frac`."""
     rule, target = goal.success, Polygon(goal.target.polygon)
     name, (low, high) = rule["where"].partition(":")[2], rule["band_px"]
     axis = 0 if name in ("top", "bottom") else 1
@@ -59,7 +59,7 @@ def side(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 
 
 def line_between(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge robots on the segment between `points`."""
+    """Judge robots on the segment between the rule's two `points`."""
     a, b = np.asarray(goal.success["points"], dtype=float)
     most = goal.success["tolerance_px"]
     off = distances(LineString([a, b]), points)
@@ -71,7 +71,7 @@ def line_between(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Par
 
 
 def centre(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
-    """Judge robots at the first of `points`."""
+    """Judge robots at the first of the rule's `points`."""
     middle, most = np.asarray(goal.success["points"][0]), goal.success["tolerance_px"]
     off = np.linalg.norm(points - middle, axis=1)
     problems, strict = (), ()
@@ -90,7 +90,7 @@ def _uneven(stations: FloatArray) -> tuple[str, ...]:
 
 
 def _on_side(target: Polygon, points: FloatArray, name: str) -> NDArray[np.bool_]:
-    """Which robots have nothing of the target between them and the picture's border that side."""
+    """Return which robots have nothing of the target between them and that side's border, (m,)."""
     far = 1e5
     way = {"left": (-far, 0), "right": (far, 0), "top": (0, -far), "bottom": (0, far)}[name]
     rays = shapely.linestrings(np.stack([points, points + way], axis=1))

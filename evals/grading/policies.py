@@ -1,7 +1,7 @@
-"""Policies that know where the thing is and understand nothing: what scores are measured against.
+"""Baseline policies that know where the thing is but understand nothing.
 
-The best of them, by cell, is the chance level printed with every table. They stand on the true
-outline, so they say what finding the thing alone would give.
+The best of them, by cell, is the chance level printed with every table. They use the true outline,
+so they show what finding the thing alone would give.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,18 +16,18 @@ from ..tasks.task import Goal
 from .attempts import grade_goals
 
 DRAWS = 4
-"""Repetitions of the policies that draw lots, for a chance level."""
+"""Repetitions of the policies that place at random, for a chance level."""
 BOX = 1.5
-"""Side of the box robots are scattered in, over the side of the target's own."""
+"""Side of the box in which robots are scattered, over the side of the target's own box."""
 
 
 def pile(goal: Goal, random: Generator) -> FloatArray:
-    """All at the centroid."""
+    """Place all robots at the centroid."""
     return np.tile(_centroid(goal), (goal.robots, 1))
 
 
 def scatter(goal: Goal, random: Generator) -> FloatArray:
-    """At random in a box half as large again as the target's."""
+    """Place robots at random in a box half as large again as the target's."""
     x0, y0, x1, y1 = goal.target.outline.bounds
     middle, half = np.array([x0 + x1, y0 + y1]) / 2, np.array([x1 - x0, y1 - y0]) / 2 * BOX
     far = np.array(goal.size) - 1.0
@@ -36,21 +36,21 @@ def scatter(goal: Goal, random: Generator) -> FloatArray:
 
 
 def boundary(goal: Goal, random: Generator) -> FloatArray:
-    """At random on the target's boundary."""
+    """Place robots at random on the target's boundary."""
     line = LineString(goal.target.outline.polygon.exterior.coords)
     stations = random.uniform(0, line.length, goal.robots)
     return shapely.get_coordinates(shapely.line_interpolate_point(line, stations))
 
 
 def circle(goal: Goal, random: Generator) -> FloatArray:
-    """Evenly on a circle about the centroid that has the target's area."""
+    """Place robots evenly on a circle about the centroid that has the target's area."""
     turns = 2 * np.pi * np.arange(goal.robots) / goal.robots
     radius = goal.target.outline.size / np.sqrt(np.pi)
     return _centroid(goal) + radius * np.stack([np.cos(turns), np.sin(turns)], axis=1)
 
 
 def line(goal: Goal, random: Generator) -> FloatArray:
-    """Evenly on a straight line through the centroid along the target's long axis."""
+    """Place robots evenly on a straight line through the centroid along the target's long axis."""
     unit, length, _ = goal.target.outline.long_axis
     return _centroid(goal) + np.linspace(-0.5, 0.5, goal.robots)[:, None] * length * unit
 
@@ -62,13 +62,13 @@ POLICIES: dict[str, Policy] = {
 
 
 def positions(name: str, goals: Sequence[Goal], seed: int) -> FloatArray:
-    """Where a policy puts the robots of all goals, (N, 2) px."""
+    """Return where a policy puts the robots of all goals, (N, 2) px."""
     random = np.random.default_rng(seed)
     return np.concatenate([POLICIES[name](goal, random) for goal in goals])
 
 
 def scores(name: str, goals: Sequence[Goal], draws: int = DRAWS) -> tuple[float, float]:
-    """Mean SR and GCR of a policy on a task; where nothing is to be placed, moving is wrong."""
+    """Return mean SR and GCR of a policy on a task; 0 if nothing is to be placed, as it moves."""
     if not goals:
         return 0.0, 0.0
     count = draws if name in ("scatter", "boundary") else 1
@@ -77,7 +77,7 @@ def scores(name: str, goals: Sequence[Goal], draws: int = DRAWS) -> tuple[float,
 
 
 def chance(tasks: Sequence[Sequence[Goal]]) -> tuple[float, float]:
-    """SR and GCR of the best policy over tasks, each the goals of one: the chance level."""
+    """Return the chance level over tasks, given by their goals: the best SR and GCR of a policy."""
     means = [np.mean([scores(name, goals) for goals in tasks], axis=0) for name in POLICIES]
     return float(max(m[0] for m in means)), float(max(m[1] for m in means))
 

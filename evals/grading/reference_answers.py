@@ -1,6 +1,6 @@
-"""A right answer to every task: the contract its rule comes to, placed on the true outline.
+"""A right answer to every task: the contract its rule amounts to, placed on the true outline.
 
-If this does not score 1, the task or the grader is wrong: a test holds every task to it.
+If it does not score 1, the task or the grader is wrong: a test checks every task.
 """
 
 from typing import Any
@@ -17,15 +17,15 @@ from .attempts import grade_goals
 from .infill import cells_within
 
 SPARE = 0.02
-"""Share by which a place keeps clear of the ends of what the rule allows."""
+"""Share by which a place keeps within the limits of the rule."""
 CELLS = 40
-"""Cells along the size of a region, at least."""
+"""Least number of cells along the size of a region."""
 WIDTHS = (0.25, 0.05)
 """Half the part of a band that is used; a narrow one follows recesses that a wide one bridges."""
 
 
 def reference(goal: Goal) -> FloatArray:
-    """Positions that satisfy a goal, (N, 2) px.
+    """Return positions that satisfy a goal, (N, 2) px.
 
     Raises:
         ToolError: no placement satisfies it.
@@ -43,7 +43,7 @@ def reference(goal: Goal) -> FloatArray:
 
 
 def _spread_inside(goal: Goal) -> FloatArray:
-    """Means of clusters of the region's cells, the nearest cells to them: quick and often even."""
+    """Return the cells nearest to the means of clusters of cells: quick, and often even."""
     rule, target = goal.success, goal.target.outline.polygon
     inner = target.buffer(-rule["min_clearance_px"] * (1 + SPARE))
     step = goal.target.outline.size / max(CELLS, 4 * goal.robots**0.5)

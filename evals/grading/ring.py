@@ -22,8 +22,9 @@ WAYS = ("right", "lower right", "bottom", "lower left", "left", "upper left", "t
 def ring(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge a ring by `band_px` and `max_gap_px`.
 
-    A robot is right if it stands in the band and at least one of the gaps beside it is closed. Of
-    the whole, the share of the way round that lies in closed gaps counts.
+    A robot is right if it stands in the band and at least one of the gaps beside it is closed. The
+    whole is the share of the way round that lies in closed gaps, at most the share that robots are
+    spread along if they do not go round.
     """
     target = Polygon(goal.target.polygon)
     stands, problems = _in_band(goal, points, free)
@@ -52,9 +53,9 @@ def ring(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
 def escape_proof(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Part:
     """Judge a cage by `band_px` and a certificate that the target cannot get out of it.
 
-    A robot is right if it stands in the band. The whole is done where those that do certainly
-    cage the target; else the share of the way round counts that they are spread along. Evenness
-    is not asked for, so strict is the same.
+    A robot is right if it stands in the band. The whole is done if those that do certainly cage the
+    target; else it is the share of the way round that they are spread along. Evenness is not asked
+    for, so strict is the same.
     """
     stands, problems = _in_band(goal, points, free)
     complete = len(points) == goal.robots and bool(stands.all())
@@ -69,7 +70,7 @@ def escape_proof(goal: Goal, points: FloatArray, free: NDArray[np.bool_]) -> Par
 def _in_band(
     goal: Goal, points: FloatArray, free: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], list[str]]:
-    """Which robots stand in the band, and what is wrong with the others."""
+    """Return which robots stand in the band, (m,), and what is wrong with the others."""
     target, (low, high) = Polygon(goal.target.polygon), goal.success["band_px"]
     near, far = distances(target, points), distances(target.convex_hull, points)
     problems: list[str] = []
@@ -103,7 +104,7 @@ def _widest(goal: Goal, loop: FloatArray, wide: FloatArray) -> str:
 
 
 def _closed_share(target: Polygon, loop: FloatArray, closed: NDArray[np.bool_]) -> float:
-    """Share of the convex hull's length that lies in no open gap."""
+    """Return the share of the convex hull's length that lies in no open gap."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
     station = _stations_along(hull, loop)
     open_ends = zip(station[~closed], np.roll(station, -1)[~closed], strict=True)
@@ -112,16 +113,17 @@ def _closed_share(target: Polygon, loop: FloatArray, closed: NDArray[np.bool_]) 
 
 
 def _share_reached(target: Polygon, loop: FloatArray) -> float:
-    """Share of the convex hull's length that the robots are spread along."""
+    """Return the share of the convex hull's length that the robots are spread along."""
     hull = LineString(shapely.get_coordinates(target.convex_hull))
     station = np.sort(_stations_along(hull, loop))
     return 1 - float(np.diff(station, append=station[0] + hull.length).max() / hull.length)
 
 
 def _even_places(goal: Goal, target: Polygon, loop: FloatArray) -> tuple[bool, float]:
-    """Whether all stand on even places of a loop in mid band whose start is free; which share.
+    """Return whether all robots stand on even places of a loop, and which share does.
 
-    Where the picture cuts the loop, the places are even along the rest of it.
+    The loop is the outline at the robots' mean distance, and the start of the places is free. If
+    the picture cuts the loop, the places are even along the rest of it.
     """
     if not goal.success.get("even") or len(loop) < 3:
         return True, 1.0
@@ -140,10 +142,10 @@ def _even_places(goal: Goal, target: Polygon, loop: FloatArray) -> tuple[bool, f
 
 
 def _order_around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
-    """Order of robots around a target: along its outline or its hull, which closes better.
+    """Return the order of robots round a target: by its outline or hull, whichever closes better.
 
-    Along the outline, taken at their mean distance from it, robots that follow a recess come in
-    turn; along the convex hull those that bridge one.
+    Along the outline, at their mean distance from it, robots that follow a recess come in turn;
+    along the convex hull those that bridge one do.
     """
     lines = (_middle_line(target, points), LineString(shapely.get_coordinates(target.convex_hull)))
     orders = [
@@ -153,22 +155,22 @@ def _order_around(target: Polygon, points: FloatArray) -> NDArray[np.intp]:
 
 
 def _middle_line(target: Polygon, points: FloatArray) -> LineString:
-    """The outline at the mean distance of points from it."""
+    """Return the outline at the mean distance of points from it."""
     return target.buffer(max(float(np.mean(distances(target, points))), 1.0)).exterior
 
 
 def _stations_along(line: LineString, points: FloatArray) -> FloatArray:
-    """Arc length of the place of a line that is nearest to each point, (m,), px."""
+    """Return the arc length of the place on a line that is nearest to each point, (m,), px."""
     return np.asarray(shapely.line_locate_point(line, shapely.points(points)), dtype=float)
 
 
 def _gaps_of_loop(loop: FloatArray) -> FloatArray:
-    """Distance of each robot of a loop to the next, the last one's to the first, (m,), px."""
+    """Return the distance of each robot of a loop to the next, the last to the first, (m,), px."""
     return np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
 
 
 def _goes_round(centre: tuple[float, float], loop: FloatArray) -> bool:
-    """Whether the polygon of the robots winds round a point of the target: a crowd does not."""
+    """Return whether the polygon of robots winds round a point of the target; a crowd doesn't."""
     x, y = (loop - centre).T
     turns = np.diff(np.arctan2(y, x), append=np.arctan2(y[0], x[0]))
     return round(float(((turns + np.pi) % (2 * np.pi) - np.pi).sum() / (2 * np.pi))) != 0

@@ -1,7 +1,7 @@
-"""Robots and slots: as many matched as can be, and slots along a loop whose start is free.
+"""Matching of robots to slots: as many as can be, and to slots along a loop with a free start.
 
-Least total distance is not the same: it gives up a match that could be had to shorten two that
-count for nothing.
+Least total distance is not the same: it gives up a match that could be had to shorten two pairs
+that count for nothing.
 """
 
 import numpy as np
@@ -11,8 +11,8 @@ from scipy.optimize import linear_sum_assignment
 from ...tools.geometry.outline import FloatArray
 
 
-def matched(points: FloatArray, slots: FloatArray, tolerance: float) -> NDArray[np.intp]:
-    """A matching of most pairs within the tolerance, of these the one of least total distance.
+def match_slots(points: FloatArray, slots: FloatArray, tolerance: float) -> NDArray[np.intp]:
+    """Match as many pairs within the tolerance as possible, with the least total distance.
 
     Args:
         points: (m, 2), px.
@@ -34,10 +34,10 @@ def matched(points: FloatArray, slots: FloatArray, tolerance: float) -> NDArray[
 
 
 def phase_free(stations: FloatArray, length: float, slots: int, tolerance: float) -> int:
-    """Most of n even slots along a loop that hold a robot, over every start of the slots.
+    """Return the most of n even slots along a loop that hold a robot, over all starts of the slots.
 
     The number changes only where a robot comes within the tolerance of a slot or leaves it, so
-    those starts are all that has to be tried; under half a gap, no robot fits two slots.
+    only those starts have to be tried; with a tolerance under half a gap, no robot fits two slots.
 
     Args:
         stations: arc length of each robot along the loop, (m,), px.
@@ -57,7 +57,7 @@ def phase_free(stations: FloatArray, length: float, slots: int, tolerance: float
 
 
 def even_along(stations: FloatArray, tolerance: float) -> int:
-    """Most of m even slots along an open line that hold a robot, its ends where the robots are.
+    """Return the most of m even slots along a line, from first to last robot, that hold a robot.
 
     Args:
         stations: arc length of each robot, (m,), px.

@@ -1,1 +1,1 @@
-"""How exact outlines are, and what the confidence in them is worth."""
+"""Measurements of how exact outlines are, and how reliable the confidence in them is."""

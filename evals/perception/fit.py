@@ -1,7 +1,7 @@
-"""Fits what the built-in segmenter's cues come to: `python -m formup.evals.perception.fit`.
+"""Fit of the built-in segmenter's confidence to its cues: `python -m formup.evals.perception.fit`.
 
 Logistic regression of whether a mask is right, with weights of 0 or more: no cue that is high
-speaks against a mask. It prints, from fits that leave the picture out, how well it does.
+speaks against a mask. It prints, from fits that leave the picture out, how reliable it is.
 """
 
 import json
@@ -24,11 +24,11 @@ CUES = {
     "outline": ("path_agreement", "agreement", "colour_separation", "prompt_fit", "compactness"),
 }
 RIDGE = 0.3
-"""How strongly weights are held small."""
+"""Strength of the ridge penalty on the weights."""
 
 
-def fitted(cues: FloatArray, right: FloatArray) -> FloatArray:
-    """The constant and the weights (k + 1,) of least loss.
+def fit_weights(cues: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the constant and the weights (k + 1,) of least loss.
 
     Args:
         cues: (n, k), 0 to 1.
@@ -47,25 +47,27 @@ def fitted(cues: FloatArray, right: FloatArray) -> FloatArray:
     return np.asarray(minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds).x)
 
 
-def left_out(samples: Sequence[Sample], cues: FloatArray, right: FloatArray) -> FloatArray:
-    """The likelihood (n,) of each from a fit without its picture."""
+def held_out_likelihoods(
+    samples: Sequence[Sample], cues: FloatArray, right: FloatArray
+) -> FloatArray:
+    """Return how likely each sample is right, (n,), from a fit without its picture."""
     pictures, likely = np.array([s.picture for s in samples]), np.zeros(len(samples))
     for picture in np.unique(pictures):
         out = pictures == picture
-        constant, *weights = fitted(cues[~out], right[~out])
+        constant, *weights = fit_weights(cues[~out], right[~out])
         likely[out] = 1 / (1 + np.exp(-(constant + cues[out] @ weights)))
     return likely
 
 
 def fit(mode: Mode) -> dict[str, float]:
-    """The weights of a way of pointing; prints how reliable the likelihoods are."""
+    """Return the weights of a way of pointing, and print how reliable the likelihoods are."""
     segmenter = GrabCutSegmenter()
     found = [s for suite in SUITES for s in measured(suite, mode, segmenter) if s.cues]
     cues = np.array([[s.cues.get(name, 1.0) for name in CUES[mode]] for s in found])
     right = np.array([float(s.overlap >= confidence.RIGHT) for s in found])
-    for line in reliability(left_out(found, cues, right), right):
+    for line in reliability(held_out_likelihoods(found, cues, right), right):
         print(mode, line)  # noqa: T201
-    constant, *weights = (round(float(w), 3) for w in fitted(cues, right))
+    constant, *weights = (round(float(w), 3) for w in fit_weights(cues, right))
     return {"constant": constant, **dict(zip(CUES[mode], weights, strict=True))}
 
 

@@ -1,4 +1,4 @@
-"""Things of suites pointed at and measured, beside what is known of them."""
+"""Samples: things of suites that are pointed at, measured and compared with the truth."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +23,7 @@ from ..tasks.task import Task
 Mode = Literal["outline", "box", "point"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 TRIALS = 3
-"""Each thing is pointed at so often, off in another way each time."""
+"""How often each thing is pointed at, with another jitter each time."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Sample:
     """One thing pointed at once, and what was measured.
 
     Attributes:
-        suite, picture, thing: what it was.
-        overlap: intersection over union with the true region; 0 where there is no outline.
-        boundary_error: 95 % of either boundary lie this near to the other one, as a share of the
-            square root of the true area (the larger of the two directions).
-        confidence: the segmenter's; `threshold` is the least that it is used at.
-        cues: what the confidence is made of.
-        seconds: of CPU; `bare_seconds` those of one GrabCut on the same window.
+        suite, picture, thing: names of what it was.
+        overlap: intersection over union with the true region; 0 if there is no outline.
+        boundary_error: distance within which 95 % of either boundary lie of the other one, as a
+            share of the square root of the true area (the larger of the two directions).
+        confidence: the segmenter's; `threshold` is the least at which a mask is used.
+        cues: what the confidence is computed from.
+        seconds: of CPU time; `bare_seconds` are those of one GrabCut on the same window.
     """
 
     suite: str
@@ -58,10 +58,10 @@ class Sample:
 
 
 def measured(suite: str, mode: Mode, segmenter: Segmenter) -> Iterator[Sample]:
-    """Every thing of a suite of pictures that its tasks are about, pointed at `TRIALS` times.
+    """Yield samples of every thing that tasks of a suite are about, pointed at `TRIALS` times.
 
     Raises:
-        InputError: no such suite, or one without pictures.
+        InputError: no such suite, or no task of it has one thing on a picture file to point at.
     """
     seen: set[tuple[Path, str]] = set()
     for task in load_suite(suite).tasks:
@@ -78,8 +78,8 @@ def measured(suite: str, mode: Mode, segmenter: Segmenter) -> Iterator[Sample]:
 
 
 def peak_memory() -> float:
-    """The most memory this process has held, MiB."""
-    import resource  # is not there on Windows
+    """Return the most memory this process has held, MiB."""
+    import resource  # does not exist on Windows
 
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
@@ -119,7 +119,7 @@ def _loaded(path: Path) -> Picture:
 
 
 def _bare_seconds(pixels: Bytes, box: Sequence[float]) -> float:
-    """The CPU time of one GrabCut in a box, the simplest thing to be had."""
+    """Return the CPU time of one GrabCut in a box, the simplest segmentation to be had, s."""
     x0, y0, x1, y1 = box
     window = window_around(pixels, (x0, y0, x1, y1))
     inside = box_region(window.shape, window.to_work(((x0, y0), (x1, y1))).ravel())

@@ -1,4 +1,4 @@
-"""Samples as tables: how exact, how many are used, and whether the confidence is kept."""
+"""Samples as tables: how exact they are, how many are used, how reliable the confidence is."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from ...tools.perception.segmenters.confidence import RIGHT
 from .samples import Mode, Sample
 
 BINS = (0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 1.0)
-"""Of the confidence, in the reliability table."""
+"""Bounds of the confidence in the reliability table."""
 
 
 class Bin(NamedTuple):
-    """Masks of like confidence: the bounds, how many, their mean confidence, the share right."""
+    """Masks of similar confidence: the bounds, how many, their mean confidence, the share right."""
 
     low: float
     high: float
@@ -26,11 +26,11 @@ class Bin(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """What a way of pointing came to on a suite; shares are of the masks, errors as in `Sample`.
+    """Results of a way of pointing on a suite; shares are of the masks, errors as in `Sample`.
 
     Attributes:
-        right: whose overlap is .8 or more.
-        wrong_if_placed: the share of those placed that are not right.
+        right: share whose overlap is .8 or more.
+        wrong_if_placed: the share of those placed that are not right; None if none are placed.
         time_ratio: CPU time over that of one GrabCut on the same windows.
     """
 
@@ -51,7 +51,7 @@ class Row:
 
 
 def row(segmenter: str, mode: Mode, suite: str, samples: Sequence[Sample]) -> Row:
-    """The row of some samples, of which there is at least one."""
+    """Return the row of samples, of which there must be at least one."""
     overlap = np.array([s.overlap for s in samples])
     error = np.array([s.boundary_error for s in samples])
     right = overlap >= RIGHT
@@ -78,7 +78,7 @@ def row(segmenter: str, mode: Mode, suite: str, samples: Sequence[Sample]) -> Ro
 
 
 def reliability(likely: FloatArray, right: FloatArray) -> Iterator[Bin]:
-    """How often masks of a confidence are right, by `BINS` that are not empty.
+    """Yield how often masks of similar confidence are right, for `BINS` that are not empty.
 
     Args:
         likely: (n,) the confidence, 0 to 1.
@@ -92,7 +92,7 @@ def reliability(likely: FloatArray, right: FloatArray) -> Iterator[Bin]:
 
 
 def markdown(rows: Sequence[Row]) -> str:
-    """Two tables: what was measured, and the reliability of the confidence."""
+    """Return two tables: what was measured, and the reliability of the confidence."""
     lines = [
         "| segmenter | pointed by | suite | masks | IoU | median | IoU >= .8 | e95 | median |"
         " placed | wrong, if placed | CPU s | times one GrabCut |",

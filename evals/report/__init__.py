@@ -1,1 +1,1 @@
-"""A run as one HTML file that needs nothing else: counts, pictures, transcripts."""
+"""A run as one self-contained HTML file: counts, pictures and transcripts."""

@@ -1,6 +1,6 @@
-"""The matrix: who (method, prompt, model) by which slice of the tasks, counts with intervals.
+"""The matrix: arms (method, prompt, model) by slices of the tasks, as counts with intervals.
 
-Intervals of counts are Wilson's, of these tasks; those of a difference are of tasks like these.
+Intervals of counts are Wilson's, on these tasks; those of a difference are on tasks like these.
 """
 
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ from .run_folder import Side
 
 SPENT = ("tokens a trial", "USD", "median s")
 COLUMNS = 11
-"""Beside the heads of the rows; so many fit 1,280 px."""
+"""Columns beside the headings of the rows; so many fit 1,280 px."""
 STEPS = 5
-"""Shades of a cell, by the share of successes."""
+"""Number of the darkest shade of a cell; shades go by the share of successes."""
 
 
 @dataclass(frozen=True)
 class MatrixCell:
-    """Text, a smaller one below it, notes, and the class of its style."""
+    """A cell: text, a smaller one below it, notes, and the class of its style."""
 
     upper: str
     lower: str = ""
@@ -33,7 +33,7 @@ class MatrixCell:
 
 @dataclass(frozen=True)
 class MatrixRow:
-    """A head with facts below it, and the cells: the total, what was spent, the other slices."""
+    """A heading with facts below it, and the cells: the total, what was spent, the other slices."""
 
     head: str
     facts: Sequence[str]
@@ -43,14 +43,14 @@ class MatrixRow:
 
 @dataclass(frozen=True)
 class Matrix:
-    """Titles of columns, and rows."""
+    """The titles of the columns, and the rows."""
 
     titles: Sequence[str]
     rows: Sequence[MatrixRow]
 
     @property
     def parts(self) -> list["Matrix"]:
-        """Tables that fit a page side by side in width, each with the heads of the rows."""
+        """Tables that are narrow enough for a page, each with the headings of the rows."""
         return [
             Matrix(
                 (self.titles[0], *self.titles[first + 1 : first + 1 + COLUMNS]),
@@ -61,7 +61,7 @@ class Matrix:
 
 
 def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matrix:
-    """A table of all arms; where two sides are compared, with the difference.
+    """Return a table of all arms, with the difference if two sides are compared.
 
     Args:
         sides: one run, or A and B, each of one arm.
@@ -91,7 +91,7 @@ def matrix(sides: Sequence[Side], comparison: Comparison | None = None) -> Matri
 
 
 def _arm_facts(arm: Arm) -> list[str]:
-    """What stands below the head of an arm's row."""
+    """Return what is shown below the heading of an arm's row."""
     facts = [f"{arm.prompt}#{(arm.sha256 or '')[:12]}"] if arm.prompt else []
     facts += [] if arm.model in ("none", arm.method) else [arm.model]
     facts += [arm.descriptor] if arm.descriptor not in (None, USUAL) else []
@@ -126,7 +126,7 @@ def _success(cell: Cell | None) -> MatrixCell:
 def _difference_row(
     a: Sequence[TrialRow], b: Sequence[TrialRow], made: Comparison, names: Sequence[str]
 ) -> MatrixRow:
-    """B minus A by slice; whether it could be chance is said of single slices alone."""
+    """Return the row of B minus A by slice; only the total and single slices have an outcome."""
     known = {name: d for slices in made.slices.values() for name, d in slices.items()}
     known[TOTAL] = made.overall
     cells = list[MatrixCell]()
@@ -145,7 +145,7 @@ def _difference_row(
 
 
 def _difference_in(a: Sequence[TrialRow], b: Sequence[TrialRow], name: str) -> Difference | None:
-    """The difference in a cell; None where the two share no trial of it."""
+    """Return the difference in a cell; None if the two share no trial of it."""
     old, new = ([row for row in rows if name in cell_names(row)] for rows in (a, b))
     try:
         return compare(old, new).overall
@@ -154,11 +154,11 @@ def _difference_in(a: Sequence[TrialRow], b: Sequence[TrialRow], name: str) -> D
 
 
 def signed_points(share: float) -> str:
-    """A share in points, with its sign."""
+    """Return a share in points, with its sign."""
     return f"{round(100 * share, 1) + 0.0:+.1f}".replace("-", "−")
 
 
 def interval_points(found: Difference) -> str:
-    """The interval of a difference, in points."""
+    """Return the interval of a difference, in points."""
     ends = (found.interval.low, found.interval.high)
     return " to ".join(f"{100 * end:+.0f}".replace("-", "−") for end in ends)

@@ -1,4 +1,4 @@
-"""The page: matrix, tasks, pictures, our own style and script, and a policy that allows no others.
+"""The page: matrix, tasks, pictures, its own style and script, and a policy that allows no others.
 
 The policy (CSP) names style and script by their hashes: text that slipped through as HTML could
 still load nothing and run nothing.
@@ -26,7 +26,7 @@ from .task_cards import cards
 
 HERE = Path(__file__).parent
 TRIALS_OPEN = 4
-"""Trials of a task that are shown at once; more are opened by hand."""
+"""Trials of a task that are shown at first; the reader opens the others."""
 
 
 def page(
@@ -36,13 +36,13 @@ def page(
     title: str = "",
     notes: Sequence[str] = (),
 ) -> str:
-    """The whole file.
+    """Return the whole HTML file.
 
     Args:
         sides: one run, or A and B of one arm each.
-        library: where the prompts of A and B are looked for.
-        table: in place of the matrix of the rows.
-        title, notes: of that, and what has to be said beside it.
+        library: where the prompts of A and B are looked up.
+        table: shown instead of the matrix of the rows.
+        title, notes: of that table; the notes are remarks shown with it.
 
     Raises:
         InputError: A and B cannot be compared.
@@ -77,7 +77,7 @@ def page(
 
 @cache
 def _environment() -> Environment:
-    """Whatever is not HTML already is escaped, so that forgetting it is harmless."""
+    """Return the environment; it escapes all that is not HTML yet, so forgetting it is harmless."""
     made = Environment(
         loader=FileSystemLoader(HERE / "templates"),
         autoescape=True,
@@ -92,14 +92,14 @@ def _environment() -> Environment:
 
 
 def _clean(value: Any) -> Any:
-    """Text with its control characters visible; anything else, and HTML, as it is."""
+    """Return text with its control characters made visible; anything else, and HTML, as it is."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
     return visible(value.replace("\r\n", "\n"))
 
 
 def _tasks_and_trials(sides: Sequence[Side]) -> str:
-    """How many tasks and trials there are."""
+    """Say how many tasks and trials there are."""
     rows = [row for side in sides for row in side.rows]
     lost = sum(not row.scored for row in rows)
     counts = f"{len({row.task for row in rows}):,} tasks, {len(rows):,} trials"

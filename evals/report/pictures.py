@@ -1,4 +1,4 @@
-"""Pictures for the page: each once, small, as JPEG inside the file."""
+"""Pictures for the page: each once, scaled down, as a JPEG inside the file."""
 
 import base64
 import io
@@ -9,7 +9,7 @@ from PIL import Image
 
 from ...tools.errors import ImageError
 from ...tools.perception.image import load_picture
-from ..tasks.rendered_pictures import RenderedPicture, hashed
+from ..tasks.rendered_pictures import RenderedPicture, pixel_hash
 from ..tasks.stored_suite import StoredSuite
 from ..tasks.task import Task
 
@@ -17,7 +17,7 @@ LONG = 900
 """Most pixels along the longer side."""
 QUALITY = 80
 MARGIN = 20
-"""px around true outlines where the picture is missing."""
+"""Margin around the true outlines if the picture is missing, px."""
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class PagePicture:
     """A picture that the page holds.
 
     Attributes:
-        id: by which the page names it; nothing where the picture is missing.
-        size: of the original, (width, height) px, in which positions are.
+        id: by which the page names it; empty if the picture is missing.
+        size: of the original, (width, height) px, in whose pixels positions are.
         data: the JPEG file.
     """
 
@@ -36,14 +36,14 @@ class PagePicture:
 
     @property
     def url(self) -> str:
-        """The file itself as a URL."""
+        """The file itself as a data URL."""
         return f"data:image/jpeg;base64,{base64.b64encode(self.data).decode()}"
 
 
 def pictures(folder: Path, suite: StoredSuite) -> dict[str, PagePicture]:
-    """The pictures of a suite's tasks by the hash of their pixels.
+    """Return the pictures of a suite's tasks by the hash of their pixels.
 
-    One that is missing, or is not what it was, is left blank.
+    One that is missing, or has changed, is left blank.
     """
     found: dict[str, PagePicture] = {}
     for task in suite.tasks:
@@ -59,7 +59,7 @@ def _page_picture(folder: Path, source: RenderedPicture, task: Task, name: str) 
         picture = load_picture(folder / source.path)
     except ImageError:
         return PagePicture("", _extent(task))
-    if hashed(picture) != source.pixels:
+    if pixel_hash(picture) != source.pixels:
         return PagePicture("", picture.size)
     image = Image.fromarray(picture.pixels)
     image.thumbnail((LONG, LONG), Image.Resampling.LANCZOS)
@@ -69,7 +69,7 @@ def _page_picture(folder: Path, source: RenderedPicture, task: Task, name: str) 
 
 
 def _extent(task: Task) -> tuple[int, int]:
-    """As much as the true outlines take, where there is no picture to measure."""
+    """Return a size, (width, height) px, that holds the true outlines of a missing picture."""
     points = [point for thing in task.things for point in thing.polygon]
     right, low = (int(max((p[axis] for p in points), default=99.0)) for axis in (0, 1))
     return right + MARGIN, low + MARGIN

@@ -1,4 +1,4 @@
-"""How the prompts of A and B differ, found by the hashes that the trials name."""
+"""Differences between the prompts of A and B, found by the hashes that the trials name."""
 
 from ...prompts import Prompt, PromptError, PromptLibrary
 from ...prompts.history import diff
@@ -6,7 +6,10 @@ from ..experiments.trials import Arm
 
 
 def prompt_diff(a: Arm, b: Arm, library: PromptLibrary) -> list[str]:
-    """The lines of a unified diff, or one that says whose text is gone; none for one text."""
+    """Return the lines of a unified diff, or one that names the prompts whose text is gone.
+
+    There are none if the two share a text, or one has no prompt.
+    """
     if a.prompt is None or b.prompt is None or (a.prompt, a.sha256) == (b.prompt, b.sha256):
         return []
     old, new = (_tried(arm, library) for arm in (a, b))
@@ -17,7 +20,10 @@ def prompt_diff(a: Arm, b: Arm, library: PromptLibrary) -> list[str]:
 
 
 def _tried(arm: Arm, library: PromptLibrary) -> Prompt | None:
-    """The prompt an arm was given; a draft may have become a version since."""
+    """Return the prompt an arm was given, if its text is still there.
+
+    A draft may have become a version since.
+    """
     id = str(arm.prompt).partition("@")[0]
     named = [name for name in library.names() if name.partition("@")[0] == id]
     for name in sorted(named, key=lambda name: name != arm.prompt):

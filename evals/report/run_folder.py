@@ -1,6 +1,6 @@
-"""Reads a run's folder for looking at: its suite, its rows, and what came of each trial.
+"""Reader of a run's folder for display: its suite, its rows, and the result of each trial.
 
-Nothing in it is trusted to be whole: what cannot be read counts as missing.
+Nothing in it is trusted to be intact: what cannot be read counts as missing.
 """
 
 import json
@@ -19,7 +19,7 @@ from ..tasks.stored_suite import ATTEMPTS, StoredSuite, read_suite
 
 Point = tuple[float, float]
 LONGEST = 4_000
-"""Characters shown of one text of a transcript."""
+"""Most characters shown of one text of a transcript."""
 
 
 class _Grade(BaseModel):
@@ -29,12 +29,12 @@ class _Grade(BaseModel):
 
 
 class StoredAttempt(BaseModel):
-    """What came of a trial.
+    """The stored result of a trial.
 
     Attributes:
         message: the text the run ended with.
-        planned, observed: positions, px; None for none.
-        found: outlines robots were placed about, px.
+        planned, observed: positions, px; None if there are none.
+        found: outlines that robots were placed about, px.
     """
 
     model_config = ConfigDict(frozen=True, extra="ignore")
@@ -47,14 +47,14 @@ class StoredAttempt(BaseModel):
 
     @property
     def right(self) -> tuple[bool, ...]:
-        """Whether each robot observed stands right; where nobody was to move, none does."""
+        """Whether each robot observed stands right; if none was to move, none does."""
         count = len(self.observed or ())
         return self.graded.right if len(self.graded.right) == count else (False,) * count
 
 
 @dataclass(frozen=True)
 class Utterance:
-    """A text of a transcript: who, perhaps about which tool, what."""
+    """A text of a transcript: who wrote it, for which tool if any, and how much was cut off."""
 
     who: str
     tool: str
@@ -67,7 +67,7 @@ class Side:
     """The rows of a run that are shown, and its folder.
 
     Attributes:
-        label: A or B where two are compared, else nothing.
+        label: A or B if two are compared, else empty.
     """
 
     folder: Path
@@ -77,16 +77,16 @@ class Side:
 
     @property
     def arms(self) -> list[Arm]:
-        """In order of their names."""
+        """The arms in order of their names."""
         arms = {arm.name: arm for arm in (row.arm for row in self.rows)}
         return [arms[name] for name in sorted(arms)]
 
     def of(self, arm: Arm) -> list[TrialRow]:
-        """The rows of an arm."""
+        """Return the rows of an arm."""
         return [row for row in self.rows if row.arm == arm]
 
     def attempt(self, row: TrialRow) -> StoredAttempt | None:
-        """What came of a trial; None where nothing can be read."""
+        """Return the stored result of a trial; None if it cannot be read."""
         try:
             content = json.loads(self._file(row, "json").read_bytes())
             # A model may have written half of a surrogate pair, which is no text.
@@ -96,7 +96,7 @@ class Side:
             return None
 
     def transcript(self, row: TrialRow) -> list[Utterance] | None:
-        """The texts and calls of a trial; None where there is no trace."""
+        """Return the texts and calls of a trial; None if there is no trace."""
         path = self._file(row, "jsonl")
         if not path.exists():
             return None
@@ -111,16 +111,16 @@ class Side:
 
 
 def side(folder: Path, rows: Sequence[TrialRow], label: str = "") -> Side:
-    """A run to be shown.
+    """Return the side of a run to be shown.
 
     Raises:
-        InputError: the folder holds nothing of its suite.
+        InputError: the folder does not hold its suite.
     """
     return Side(folder, read_suite(folder), tuple(rows), label)
 
 
 def _utterances(line: Mapping[str, Any]) -> list[Utterance]:
-    """A message of a trace as texts."""
+    """Return a message of a trace as texts."""
     text = line.get("text", "")
     if line["role"] == "user":
         return [_shortened("person", "", text)]

@@ -40,15 +40,15 @@ class Card:
 
     @property
     def failed(self) -> bool:
-        """Whether any trial did."""
+        """Whether any scored trial failed."""
         return self.passed < self.scored
 
 
 def cards(sides: Sequence[Side], pictures: Mapping[str, PagePicture]) -> list[Card]:
-    """A card for each task, in the suite's order.
+    """Return a card for each task that was tried, in the suite's order.
 
     Args:
-        sides: one run, or A and B, whose trials stand next to each other.
+        sides: one run, or A and B, whose trials are shown next to each other.
         pictures: by the hash of their pixels.
     """
     trials: defaultdict[str, list[tuple[Side, TrialRow]]] = defaultdict(list)
@@ -64,7 +64,7 @@ def cards(sides: Sequence[Side], pictures: Mapping[str, PagePicture]) -> list[Ca
 
 
 def _number_and_arm(trial: tuple[Side, TrialRow]) -> tuple[int, str, str]:
-    """Trials of a number stand together, in the order of arms."""
+    """Return a sort key that keeps trials of a number together, in the order of arms."""
     side, row = trial
     return row.trial, side.label, row.arm.name
 

@@ -1,4 +1,4 @@
-"""What a trial placed, to be drawn over its picture: true outlines, slots, robots, misses.
+"""The overlay of a trial on its picture: true outlines, slots, robots, misses.
 
 Frame: pixels of the picture, x right, y down, pixel centres at .0. A robot that stands wrong is
 marked by its shape, not by colour alone. Rings have no slots, as they may begin anywhere: their
@@ -13,15 +13,15 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from ..grading.slots import matched
+from ..grading.slots import match_slots
 from ..tasks.task import Goal, Task
 from .pictures import PagePicture
 from .run_folder import StoredAttempt
 
 MARK = 0.011
-"""Radius of a robot as a share of the picture's long side."""
+"""Radius of a robot's mark as a share of the picture's long side."""
 CROWD = 20
-"""Robots above which marks are drawn smaller."""
+"""Number of robots above which marks are drawn smaller."""
 Point = tuple[float, float]
 Ends = tuple[Point, Point]
 
@@ -37,7 +37,7 @@ class Path:
 
 @dataclass(frozen=True)
 class Slot:
-    """A place that a rule names, as wide as its tolerance."""
+    """A place named by a rule, as wide as its tolerance; `held` if a robot is there."""
 
     x: float
     y: float
@@ -71,13 +71,13 @@ class Drawing:
 
 
 def drawing(task: Task, attempt: StoredAttempt | None, picture: PagePicture, title: str) -> Drawing:
-    """A picture with what belongs on it.
+    """Return a picture with all that is drawn over it.
 
     Args:
         task: whose truth is drawn.
         attempt: of the trial; None for the truth alone.
-        picture: what it is drawn on, which the page holds once.
-        title: for those who do not see it.
+        picture: the one it is drawn on, which the page holds once.
+        title: for readers who cannot see it.
     """
     shown = attempt or StoredAttempt()
     planned, observed, size = shown.planned or (), shown.observed or (), picture.size
@@ -104,7 +104,7 @@ def drawing(task: Task, attempt: StoredAttempt | None, picture: PagePicture, tit
 
 
 def _truth_paths(goal: Goal) -> Iterator[Path]:
-    """The true outlines, and where robots may stand as far as the rule says it."""
+    """Yield the true outlines, and where robots may stand as far as the rule says so."""
     for thing in goal.things:
         yield from _paths(thing.region, "truth", thing.name)
     rule, target = goal.success, goal.target.region
@@ -118,7 +118,7 @@ def _truth_paths(goal: Goal) -> Iterator[Path]:
 
 
 def _rule_slots(goal: Goal, attempt: StoredAttempt | None) -> list[Slot]:
-    """Places that the rule names; all count as held where no trial is shown."""
+    """Return the places that the rule names; all count as held if no trial is shown."""
     rule = goal.success
     if rule["where"] not in ("corners", "center"):
         return []
@@ -127,7 +127,7 @@ def _rule_slots(goal: Goal, attempt: StoredAttempt | None) -> list[Slot]:
     if attempt is not None:
         standing = zip(attempt.observed or (), attempt.right, strict=True)
         robots = np.asarray([point for point, right in standing if right]).reshape(-1, 2)
-        taken = matched(robots, places, most) if len(robots) else np.array([], dtype=np.intp)
+        taken = match_slots(robots, places, most) if len(robots) else np.array([], dtype=np.intp)
         held = np.isin(np.arange(len(places)), taken)
     return [
         Slot(x, y, most, full) for (x, y), full in zip(places.tolist(), held.tolist(), strict=True)
@@ -135,13 +135,13 @@ def _rule_slots(goal: Goal, attempt: StoredAttempt | None) -> list[Slot]:
 
 
 def _mark(number: int, point: Point, kind: str, size: tuple[int, int]) -> Mark:
-    """Where it can be seen: what is outside the picture is drawn at its edge."""
+    """Return the mark of a robot; one outside the picture is drawn at its edge, to be seen."""
     x, y = (min(max(value, 0.0), side - 1.0) for value, side in zip(point, size, strict=True))
     return Mark(x, y, kind, f"robot {number}, {kind} at {point[0]:.1f}, {point[1]:.1f}")
 
 
 def _paths(shape: BaseGeometry, kind: str, title: str) -> Iterator[Path]:
-    """The outlines of a shape, which may have parts and holes or be empty."""
+    """Yield the outlines of a shape, which may have parts and holes or be empty."""
     for part in shapely.get_parts(shape):
         if isinstance(part, Polygon):
             for ring in (part.exterior, *part.interiors):

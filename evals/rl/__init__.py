@@ -1,1 +1,1 @@
-"""The paper's baseline of reinforcement learning: teams of robots about a target, and policies."""
+"""The paper's reinforcement-learning baseline: teams of robots around a target, and policies."""

@@ -1,6 +1,6 @@
-"""What training came to over seeds: interquartile mean with a bootstrap interval, and its picture.
+"""Training curves over seeds: interquartile mean with a bootstrap interval, and their picture.
 
-A seed that stopped before others keeps its last score.
+A seed that stopped before the others keeps its last score.
 """
 
 import io
@@ -17,15 +17,15 @@ from .teams import CATEGORIES
 
 DRAWS, LEVEL = 2_000, 0.95
 SIZE, FRAME = (800, 440), (60, 40, 580, 390)
-"""Of the picture, and its axes' box, px."""
+"""Size of the picture, and the box of its axes, px."""
 COLOURS = dict(zip(CATEGORIES, ((31, 119, 180), (44, 160, 44), (214, 39, 40)), strict=True))
 
 
 def summary(checkpoints: Sequence[Checkpoint]) -> tuple[list[int], FloatArray, FloatArray]:
-    """Steps (n), the interquartile mean over seeds (n,), and its interval at 95 %, (2, n).
+    """Return the steps (n), the interquartile mean over seeds (n,), and its 95 % interval (2, n).
 
     Args:
-        checkpoints: of one category, one a seed.
+        checkpoints: of one category, one per seed.
     """
     steps = sorted({step for c in checkpoints for step, _ in c.curve})
     scores = np.array(
@@ -38,7 +38,7 @@ def summary(checkpoints: Sequence[Checkpoint]) -> tuple[list[int], FloatArray, F
 
 
 def picture(checkpoints: Sequence[Checkpoint]) -> bytes:
-    """The training curves of all categories, as a PNG."""
+    """Return the training curves of all categories, as a PNG."""
     image, most = Image.new("RGB", SIZE, "white"), max(c.curve[-1][0] for c in checkpoints)
     draw = ImageDraw.Draw(image, "RGBA")
     x0, y0, x1, y1 = FRAME

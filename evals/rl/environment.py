@@ -1,4 +1,4 @@
-"""One team about one target as a gymnasium environment, for others to train on.
+"""One team around one target as a gymnasium environment, for others to train on.
 
     gymnasium.make("formup.evals.rl.environment:formup/PatternFormation-v0", category="infill")
 
@@ -21,15 +21,16 @@ ID = "formup/PatternFormation-v0"
 
 
 class PatternFormation(_gymnasium.Env):
-    """Robots that share a reward: the mean of what each is paid, which `info` has too.
+    """Robots that share a reward: the mean of each one's reward, which `info` has too.
 
     An action is a move of each robot, (robots, 2), away from the target's centre and
-    counter-clockwise about it, in strides; an observation what each sees, (robots, 14): see Teams.
+    counter-clockwise about it, in strides; an observation is what each sees, (robots, 14): see
+    Teams.
 
     Args:
         category: general, infill or caging.
         robots: of the team.
-        outline: of the target, (n, 2); by default each episode has another, of drawn shapes.
+        outline: of the target, (n, 2); by default each episode draws another shape.
 
     Raises:
         InputError: no such category, no robot, or no outline.
@@ -56,7 +57,7 @@ class PatternFormation(_gymnasium.Env):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, FloatArray]]:
-        """Begin an episode with robots anywhere about the target."""
+        """Begin an episode with robots at random places about the target."""
         super().reset(seed=seed)
         random = self.np_random
         outlines = random_outlines(1, random) if self._outline is None else self._outline[None]
@@ -66,13 +67,13 @@ class PatternFormation(_gymnasium.Env):
     def step(
         self, action: FloatArray
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, FloatArray]]:
-        """Move all robots at once; an episode of `gymnasium.make` is cut off after 32 moves."""
+        """Move all robots at once; `gymnasium.make` cuts an episode off after 32 moves."""
         self._teams.move(np.asarray(action, dtype=float)[None])
         info = self._info()
         return self._teams.seen()[0], float(info["rewards"].mean()), False, False, info
 
     def _info(self) -> dict[str, FloatArray]:
-        """Where robots stand, in units of the target's size, and what each is paid."""
+        """Return where robots stand, in units of the target's size, and the reward of each."""
         return {"places": self._teams.places[0].copy(), "rewards": self._teams.rewards()[0]}
 
 

@@ -21,7 +21,7 @@ from ..tasks.task import Goal
 from .teams import CATEGORIES, STEPS, Category, Teams, outline_points
 
 RL = "rl"
-"""The method."""
+"""Name of the method."""
 TRAIN = "formup eval train-rl"
 
 
@@ -32,14 +32,14 @@ class Policy:
     layers: tuple[tuple[FloatArray, FloatArray], ...]
 
     def __call__(self, seen: ArrayLike) -> FloatArray:
-        """The move of each robot, from what it sees, (..., SEEN) to (..., 2)."""
+        """Return the move of each robot for what it sees, (..., SEEN) to (..., 2)."""
         value = np.asarray(seen, dtype=float)
         for i, (weights, biases) in enumerate(self.layers):
             value = (np.tanh(value) if i else value) @ weights.T + biases
         return np.clip(value, -1, 1)
 
     def play(self, teams: Teams) -> FloatArray:
-        """Move teams through an episode; where robots stand at its end."""
+        """Move teams through an episode; return where robots stand at its end."""
         for _ in range(STEPS):
             teams.move(self(teams.seen()))
         return teams.places
@@ -50,11 +50,11 @@ class Checkpoint(BaseModel, frozen=True, extra="forbid"):
 
     Attributes:
         robots: of the teams it was trained in.
-        budget: most steps of robots it might take.
-        converged: whether its scores stayed where they were before the budget ended.
+        budget: most steps of robots that training might take.
+        converged: whether its scores levelled off before the budget ended.
         sha256: of its weights' file.
-        curve: steps taken, and mean reward at the end of an episode.
-        versions: of what trained it.
+        curve: (steps taken, mean reward at the end of an episode).
+        versions: of the packages that trained it.
     """
 
     category: Category
@@ -68,7 +68,7 @@ class Checkpoint(BaseModel, frozen=True, extra="forbid"):
 
     @property
     def name(self) -> str:
-        """Of its files, without an ending."""
+        """Name of its files, without an extension."""
         return f"{self.category}-{self.seed}"
 
 
@@ -87,8 +87,8 @@ class Trained:
         return [category for category in CATEGORIES if category in found]
 
     @property
-    def told(self) -> str:
-        """In words, for the head of a row."""
+    def description(self) -> str:
+        """Description in words, for the heading of a row."""
         sizes = " and ".join(sorted({str(c.robots) for c in self.checkpoints}))
         seeds = min(map(len, self.policies.values()))
         words = f"PPO on true outlines, teams of {sizes}, {seeds} seed{'s'[: seeds > 1]}"
@@ -97,10 +97,10 @@ class Trained:
 
 
 def read_checkpoints(folder: Path) -> list[Checkpoint]:
-    """What a folder says of its policies, by category and seed.
+    """Return how the policies of a folder were trained, sorted by category and seed.
 
     Raises:
-        InputError: a file of it cannot be read.
+        InputError: one of its files cannot be read.
     """
     found = list[Checkpoint]()
     for path in sorted(folder.glob("*-*.json")):
@@ -114,10 +114,10 @@ def read_checkpoints(folder: Path) -> list[Checkpoint]:
 
 @lru_cache(maxsize=4)
 def trained(folder: Path) -> Trained:
-    """The policies of a folder.
+    """Return the policies of a folder.
 
     Raises:
-        InputError: there are none of a category, or weights that are not the ones trained.
+        InputError: a category has none, or weights are not the ones that were trained.
     """
     checkpoints = read_checkpoints(folder)
     policies = {
@@ -145,14 +145,14 @@ def _policy(folder: Path, checkpoint: Checkpoint) -> Policy:
 
 
 def places(folder: Path, category: str, goals: Sequence[Goal], trial: int, seed: int) -> FloatArray:
-    """Where trained robots go that know where the thing is, (N, 2) px.
+    """Return where trained robots, which know where the thing is, go, (N, 2) px.
 
     Args:
-        folder: of checkpoints; a try takes the next seed of them.
+        folder: of checkpoints; each try takes the policy of the next seed.
         category: of the task.
-        goals: of it.
+        goals: of the task.
         trial: number of the try.
-        seed: of where the robots start.
+        seed: for where the robots start.
     """
     policies, random = trained(folder).policies[category], np.random.default_rng(seed)
     policy, found = policies[trial % len(policies)], list[FloatArray]()

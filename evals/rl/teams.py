@@ -1,8 +1,8 @@
-"""Teams of robots about targets, many at once: what each robot sees, how it moves, its reward.
+"""Many teams of robots around targets at once: what each robot sees, how it moves, its reward.
 
-The paper names one reward a category and no formula: caging rewards enclosing the target, infill
-structured spacing inside it, general nearness to a reference point. What these are taken for here
-is in `Teams.rewards`.
+The paper names one reward per category but no formula: caging rewards enclosing the target,
+infill structured spacing inside it, general nearness to a reference point. `Teams.rewards` says
+how these are understood here.
 """
 
 from typing import Literal, get_args
@@ -21,28 +21,28 @@ from ..scenes import polygons as shapes
 Category = Literal["general", "infill", "caging"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 STEPS = 32
-"""Moves of an episode."""
+"""Moves per episode."""
 STRIDE = 0.15
 """Longest move along an axis; lengths are in units of the square root of the target's area."""
 START = 2.0
-"""Half the side of the square about the target that robots start in."""
+"""Half the side of the square about the target in which robots start."""
 CLEARANCE = 0.16
-"""Wanted from the outline where robots stand around it."""
+"""Distance wanted from the outline if robots stand around it."""
 REACH = 0.5
-"""Distance from where a robot is wanted at which it is paid 1/e."""
+"""Distance from where a robot is wanted at which the reward for nearness is 1/e."""
 CROWDED = 0.15
-"""Distance below which two robots cost each other."""
+"""Distance below which two robots cost each other reward."""
 NEIGHBOURS = 4
 SEEN = 6 + 2 * NEIGHBOURS
-"""Numbers that a robot sees."""
+"""How many numbers a robot sees."""
 FAR = 3.0
-"""The largest of them, and the farthest from the target that a robot gets along an axis."""
+"""The largest of them, and how far from the target a robot can get along an axis."""
 POINTS = 48
-"""Of an outline."""
+"""Points of an outline."""
 
 
 def outline_points(polygon: Polygon) -> tuple[FloatArray, FloatArray, float]:
-    """An outline evenly along its exterior in units of its size, (POINTS, 2), its centre and size.
+    """Return points evenly along an outline in units of its size, (POINTS, 2), its centre and size.
 
     Holes are filled: robots see the exterior alone.
     """
@@ -54,7 +54,7 @@ def outline_points(polygon: Polygon) -> tuple[FloatArray, FloatArray, float]:
 
 
 def random_outlines(count: int, random: Generator) -> FloatArray:
-    """Outlines of shapes like those of drawn scenes, turned at random, (count, POINTS, 2)."""
+    """Return outlines like those of drawn scenes, turned at random, (count, POINTS, 2)."""
     made = list[FloatArray]()
     for _ in range(count):
         ratio = float(random.uniform(1, 2.5))
@@ -72,16 +72,16 @@ def random_outlines(count: int, random: Generator) -> FloatArray:
 
 
 class Teams:
-    """Teams of equal size, each about a target of its own.
+    """Teams of equal size, each around a target of its own.
 
     Attributes:
-        places: of the robots, (teams, robots, 2), the target's centroid at the origin.
+        places: of the robots, (teams, robots, 2), with the target's centroid at the origin.
 
     Args:
         category: one of CATEGORIES.
         robots: of each team.
         outlines: of the targets, (teams, POINTS, 2), counter-clockwise in (x, y).
-        random: where robots start.
+        random: draws where robots start.
     """
 
     def __init__(self, category: str, robots: int, outlines: FloatArray, random: Generator) -> None:
@@ -93,7 +93,7 @@ class Teams:
         """Move each robot away from the target's centre and counter-clockwise about it.
 
         Args:
-            actions: (teams, robots, 2), in strides; more than one is one.
+            actions: (teams, robots, 2), in strides, clipped to one either way.
         """
         moves = STRIDE * np.clip(actions, -1, 1)
         out, about = self._frame
@@ -102,11 +102,11 @@ class Teams:
         self._look()
 
     def seen(self) -> NDArray[np.float32]:
-        """What each robot sees, (teams, robots, SEEN), each axis as it moves along.
+        """Return what each robot sees, (teams, robots, SEEN), in the axes that it moves along.
 
-        The way to the outline, the distance from it (inside negative) and from the centre; the
-        gaps to the next robots either way round, 1 where all are even; the ways to the nearest
-        others, by how close many stand in a unit of area, FAR for those there are not.
+        The vector to the outline, the distance from it (inside negative) and from the centre; the
+        gaps to the next robots either way round, 1 if all are even; the vectors to the nearest
+        others times the root of the team's size, FAR for those that do not exist.
         """
         count = self.places.shape[1]
         order = np.argsort(self._apart, axis=2)[..., : min(NEIGHBOURS, count - 1), None]
@@ -122,12 +122,12 @@ class Teams:
         return np.clip(seen, -FAR, FAR).astype(np.float32)
 
     def rewards(self) -> FloatArray:
-        """Of each robot as it stands, (teams, robots), at most 1.
+        """Return the reward of each robot where it stands, (teams, robots), at most 1.
 
-        General: nearness to the point of the outline, at the usual clearance, that is nearest.
-        Infill: nearness to the inside, and half of it by the distance to the nearest other robot.
-        Caging: nearness as in general, and half of it by the lesser gap to the next robots either
-        way round. Always: robots that crowd each other lose.
+        General: nearness to the usual clearance from the nearest point of the outline.
+        Infill: nearness to the inside, half of it scaled by the distance to the nearest robot.
+        Caging: nearness as in general, half of it scaled by the lesser gap to the next robots
+        either way round. Always: robots that crowd each other lose.
         """
         count, nearest = self.places.shape[1], self._apart.min(axis=2)
         crowded = np.clip(1 - nearest / CROWDED, 0, 1)
@@ -141,7 +141,7 @@ class Teams:
         return earned - crowded
 
     def _look(self) -> None:
-        """Measure what is seen and paid for."""
+        """Measure what robots see and are rewarded for."""
         self._way, self._off, along = _to_outline(self.places, self._outlines)
         radius = np.linalg.norm(self.places, axis=2, keepdims=True)
         out = np.where(radius > 1e-6, self.places / np.maximum(radius, 1e-6), (1.0, 0.0))
@@ -159,7 +159,10 @@ class Teams:
 def _to_outline(
     points: FloatArray, outlines: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The way of each point to its outline, its distance (inside negative), and where round it."""
+    """Return each point's vector to its outline, distance (inside negative) and place round it.
+
+    The place is that of the nearest point of the outline, 0 to 1.
+    """
     start = outlines[:, None]
     edge = np.roll(outlines, -1, axis=1)[:, None] - start
     rel = points[:, :, None] - start

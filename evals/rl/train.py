@@ -1,6 +1,6 @@
-"""PPO with one policy for all robots, by stable-baselines3: the one module that runs it and torch.
+"""PPO with one policy for all robots, by stable-baselines3: the only module that runs it and torch.
 
-Each robot of each team is an environment of its own to PPO. Loaded by the command that trains.
+To PPO each robot of each team is an environment of its own. Loaded by the command that trains.
 """
 
 import hashlib
@@ -22,11 +22,11 @@ _vec: Any = import_module("stable_baselines3.common.vec_env")
 _spaces: Any = import_module("gymnasium.spaces")
 Floats = NDArray[np.float32]
 TEAMS, POOL, JUDGED = 64, 512, 64
-"""Teams that learn at once, outlines they meet, and teams that scores are taken of."""
+"""Teams that learn at once, outlines they meet, and teams that are scored."""
 ROLLOUTS = 4
 """Episodes of all teams between two scores."""
 PATIENCE, GAIN = 8, 0.01
-"""Plateau: the mean of so many scores is not above that of as many before them by this."""
+"""Plateau: the mean of so many scores exceeds that of as many before them by less than this."""
 SETTINGS: dict[str, Any] = {
     "n_steps": STEPS,
     "batch_size": 2048,
@@ -39,13 +39,13 @@ SETTINGS: dict[str, Any] = {
 
 
 def train(category: Category, robots: int, seed: int, budget: int, folder: Path) -> Checkpoint:
-    """Train a policy until its scores stay where they are or the budget is spent, and keep it.
+    """Train a policy until its scores level off or the budget is spent, and store it.
 
     Args:
-        category: that it is rewarded for.
+        category: the one it is rewarded for.
         robots: of a team.
-        seed: of everything.
-        budget: steps of robots after which no other episodes are begun.
+        seed: of all randomness in training.
+        budget: steps of robots after which no more episodes are begun.
         folder: for its files; weights are written at each scoring.
     """
     _torch.set_num_threads(1)  # networks this small are slower on several
@@ -73,7 +73,7 @@ def train(category: Category, robots: int, seed: int, budget: int, folder: Path)
 
 
 def score(policy: Policy, category: str, robots: int) -> float:
-    """Mean reward at the end of an episode, on outlines and starts that training does not meet."""
+    """Return the mean reward at the end of an episode, on outlines and starts not trained on."""
     random = np.random.default_rng(1 << 40)
     teams = Teams(category, robots, random_outlines(JUDGED, random), random)
     policy.play(teams)
@@ -81,13 +81,13 @@ def score(policy: Policy, category: str, robots: int) -> float:
 
 
 def plateau(scores: list[float]) -> bool:
-    """Whether scores no longer rise."""
+    """Return whether scores no longer rise."""
     late, early = scores[-PATIENCE:], scores[-2 * PATIENCE : -PATIENCE]
     return len(early) == PATIENCE and float(np.mean(late) - np.mean(early)) < GAIN
 
 
 def actor(model: Any) -> Policy:
-    """The part of PPO's network that acts, as arrays."""
+    """Return the part of PPO's network that acts, as arrays."""
     net = model.policy
     linear = [*(m for m in net.mlp_extractor.policy_net if hasattr(m, "weight")), net.action_net]
     return Policy(
@@ -96,7 +96,7 @@ def actor(model: Any) -> Policy:
 
 
 def _keep(policy: Policy, path: Path) -> str:
-    """Write weights; the hash of the file, in which nothing depends on the time."""
+    """Write weights; return the hash of the file, in which nothing depends on the time."""
     file, named = io.BytesIO(), dict[str, Any]()
     for i, (weights, biases) in enumerate(policy.layers):
         named |= {f"w{i}": weights, f"b{i}": biases}
@@ -106,7 +106,7 @@ def _keep(policy: Policy, path: Path) -> str:
 
 
 class Robots(_vec.VecEnv):
-    """All robots of all teams as stable-baselines3 wants them; an episode ends for all at once."""
+    """All robots of all teams as a vectorised environment; an episode ends for all at once."""
 
     def __init__(self, category: str, robots: int, seed: int) -> None:
         self._random = np.random.default_rng(seed)
@@ -116,7 +116,7 @@ class Robots(_vec.VecEnv):
         super().__init__(TEAMS * robots, seen, _spaces.Box(-1, 1, (2,), np.float32))
 
     def reset(self) -> Floats:
-        """Begin an episode about other targets."""
+        """Begin an episode around other targets."""
         outlines = self._pool[self._random.integers(POOL, size=TEAMS)]
         self._teams = Teams(self._category, self._robots, outlines, self._random)
         self._left = STEPS
@@ -128,7 +128,10 @@ class Robots(_vec.VecEnv):
         self._left -= 1
 
     def step_wait(self) -> tuple[Floats, Floats, NDArray[np.bool_], list[dict[str, Any]]]:
-        """What they see and are paid; where time runs out nothing is lost, and another begins."""
+        """Return what robots see and their rewards; after the last step another episode begins.
+
+        Nothing of the one that ended is lost: `infos` has its last observation, marked as cut off.
+        """
         rewards, seen = self._teams.rewards().ravel().astype(np.float32), self._seen
         infos: list[dict[str, Any]] = [{} for _ in rewards]
         if not self._left:
@@ -141,14 +144,14 @@ class Robots(_vec.VecEnv):
         return self._teams.seen().reshape(-1, SEEN)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Of each entry; they have none of their own."""
+        """Return None for each environment; they have no attributes of their own."""
         return [None] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """No entry is."""
+        """Return False for each environment; none is wrapped."""
         return [False] * self.num_envs
 
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Do nothing, as nothing is open."""
 
     set_attr = env_method = get_attr

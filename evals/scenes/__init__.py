@@ -1,1 +1,1 @@
-"""Drawn scenes with exact outlines, as many as wanted: graded pictures nothing was fitted to."""
+"""Procedurally drawn scenes with exact outlines: any number of pictures nothing was fitted to."""

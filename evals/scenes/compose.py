@@ -1,4 +1,4 @@
-"""Composes a scene in which one thing can be told by a given kind of reference."""
+"""Composition of scenes in which one thing can be told by a given kind of reference."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ Choice = tuple[Sort, str]
 
 @dataclass(frozen=True)
 class Stage:
-    """What is settled before the things: the family, the picture's size and the ground."""
+    """What is chosen before the things: the family, the picture's size and the ground."""
 
     family: Family
     size: tuple[int, int]
@@ -32,11 +32,11 @@ class Stage:
         return 0.0, 0.0, self.size[0] - 1.0, self.size[1] - 1.0
 
     def base(self, share: float) -> float:
-        """Size of a thing that has this share of the picture's area, px."""
+        """Return the size, px, of a thing that covers this share of the picture's area."""
         return math.sqrt(share * self.size[0] * self.size[1])
 
     def visible(self, random: Generator) -> list[Choice]:
-        """Sorts with the colours that stand out from the ground."""
+        """Return the sorts with those of their colours that stand out from the ground."""
         return [
             (sort, colour)
             for sort in self.family.sorts
@@ -47,7 +47,7 @@ class Stage:
 
 
 def stage(random: Generator, family: Family) -> Stage:
-    """A size of picture and a ground."""
+    """Choose the size of a picture and its ground."""
     width = int(random.integers(480, 961))
     ratio = float(random.choice([1.0, 4 / 3, 4 / 3, 3 / 2, 16 / 10, 5 / 6]))
     size = width, min(round(width / ratio), 800)
@@ -55,15 +55,15 @@ def stage(random: Generator, family: Family) -> Stage:
 
 
 def compose(random: Generator, seed: int, where: Stage, kind: str, setup: str) -> Scene | None:
-    """A scene on a stage, its target first where that is settled; None where none came about."""
+    """Compose a scene on a stage, its target first if that is settled; None if it fails."""
     choices = where.visible(random)
     solid = [choice for choice in choices if not choice[0].encloses]
     if setup == "single":
         things = _single_thing(random, where, solid)
     elif kind in HIDDEN:
-        things = _odd(random, where, solid, kind)
+        things = _place_odd_one_out(random, where, solid, kind)
     else:
-        things = _many(random, where, choices, kind)
+        things = _place_mixed(random, where, choices, kind)
     if not things:
         return None
     ground = where.ground
@@ -96,8 +96,8 @@ def _look(random: Generator, things: Sequence[Thing]) -> Look:
     )
 
 
-def _some(random: Generator, choices: Sequence[Choice]) -> Choice | None:
-    """One of the choices, each noun as likely as another; None of none."""
+def _pick(random: Generator, choices: Sequence[Choice]) -> Choice | None:
+    """Choose one, each noun as likely as another; None if there are none."""
     nouns = sorted({sort.noun for sort, _ in choices})
     if not nouns:
         return None
@@ -109,7 +109,7 @@ def _some(random: Generator, choices: Sequence[Choice]) -> Choice | None:
 def _single_thing(
     random: Generator, where: Stage, solid: list[Choice]
 ) -> list[Thing] | Rows | None:
-    picked = _some(random, solid)
+    picked = _pick(random, solid)
     if picked is None:
         return None
     share = math.exp(random.uniform(math.log(0.012), math.log(0.14)))
@@ -119,7 +119,7 @@ def _single_thing(
 
 
 def _turns_of_things(random: Generator, where: Stage, count: int) -> tuple[float, list[float]]:
-    """A direction of the whole and each thing's turn against it, degrees."""
+    """Choose a direction of the whole and each thing's turn relative to it, degrees."""
     style = where.family.turns
     if style == "either":
         style = "aligned" if random.random() < 0.5 else "free"
@@ -144,12 +144,12 @@ def _arranged(
     return scatter(random, where.area, things, [base + t for t in turns], {})
 
 
-def _odd(
+def _place_odd_one_out(
     random: Generator, where: Stage, solid: list[Choice], kind: str
 ) -> list[Thing] | Rows | None:
-    """Things alike, the first one differing in what the kind says."""
+    """Make and place things that are alike, the first one differing in what the kind names."""
     turned = kind == "askew"
-    usual = _some(random, [c for c in solid if c[0].upright or not turned])
+    usual = _pick(random, [c for c in solid if c[0].upright or not turned])
     if usual is None:
         return None
     count = int(random.integers(5, 12))
@@ -158,9 +158,9 @@ def _odd(
     sizes = size * random.uniform(0.98, 1.02, count)
     if kind == "odd_colour":
         here, own = shade(random, usual[1]), [c for c in solid if c[0] is usual[0]]
-        odd = _some(random, [c for c in own if difference(shade(random, c[1]), here) > 38])
+        odd = _pick(random, [c for c in own if difference(shade(random, c[1]), here) > 38])
     elif kind == "odd_shape":
-        odd = _some(random, [c for c in solid if _unlike(c, usual)])
+        odd = _pick(random, [c for c in solid if _unlike(c, usual)])
     elif kind == "odd_size":
         sizes[0] *= (
             random.uniform(1.45, 1.75) if random.random() < 0.6 else 1 / random.uniform(1.45, 1.7)
@@ -189,7 +189,7 @@ def _odd(
 
 
 def _unlike(choice: Choice, usual: Choice) -> bool:
-    """The same colour in a form of another kind."""
+    """Return whether it is of the usual one's colour, but of a clearly different form."""
     a, b = make_one(choice), make_one(usual)
     same_look = abs(a.stretch - b.stretch) < 0.5 and abs(a.roundness - b.roundness) < 0.12
     return (
@@ -201,12 +201,12 @@ def _unlike(choice: Choice, usual: Choice) -> bool:
 
 
 def make_one(choice: Choice) -> Thing:
-    """A specimen of fixed form, to compare sorts by."""
+    """Make a specimen of fixed form, to compare sorts by."""
     return make(np.random.default_rng(0), *choice, 100)
 
 
 def _cluster(random: Generator, where: Stage, things: list[Thing]) -> list[Thing] | None:
-    """All but the first near each other, the first far away."""
+    """Place all but the first near each other, and the first far away; None if it fails."""
     share, flipped = random.uniform(0.5, 0.62), random.random() < 0.5
     axis = int(where.area[2] < where.area[3])
     long, part, rest = where.area[axis + 2], list(where.area), list(where.area)
@@ -224,10 +224,10 @@ def _cluster(random: Generator, where: Stage, things: list[Thing]) -> list[Thing
     return [*alone, *many] if alone else None
 
 
-def _many(
+def _place_mixed(
     random: Generator, where: Stage, choices: list[Choice], kind: str
 ) -> list[Thing] | Rows | None:
-    """Things of a few sorts in a few colours, the first of them meant to be told by the kind."""
+    """Make and place things of a few sorts and colours, the first to be told by the kind."""
     count = int(random.integers(4, 13))
     palette = _choices_for(random, [c for c in choices if not c[0].encloses], kind, count)
     if palette is None:
@@ -258,16 +258,19 @@ def _many(
 def _choices_for(
     random: Generator, solid: list[Choice], kind: str, count: int
 ) -> list[Choice] | None:
-    """What each thing is. The first is alone in what the kind names, those it names are too."""
-    pool = [_some(random, solid) for _ in range(int(random.integers(2, 5)))]
+    """Choose what each thing is.
+
+    The first is unique in what the kind names; none can be taken for one that the reference names.
+    """
+    pool = [_pick(random, solid) for _ in range(int(random.integers(2, 5)))]
     nouns, colours = {c[0].noun for c in pool if c}, {c[1] for c in pool if c}
     mixed = [c for c in solid if c[0].noun in nouns and c[1] in colours]
-    first = _some(random, [c for c in mixed if _leads(c, kind)])
+    first = _pick(random, [c for c in mixed if _can_be_target(c, kind)])
     if first is None:
         return None
-    more = [_some(random, mixed) for _ in range(_NAMED.get(kind, 0))]
+    more = [_pick(random, mixed) for _ in range(_NAMED.get(kind, 0))]
     named = [first, *filter(None, more)]
-    left = [[c for c in some if _leaves(c, first, kind)] for some in (mixed, solid)]
+    left = [[c for c in some if _can_stand_beside(c, first, kind)] for some in (mixed, solid)]
     for other in named[1:]:
         left = [[c for c in some if not _confused(c, other)] for some in left]
     rest = left[0] or left[1]
@@ -281,18 +284,18 @@ _NAMED = {"left_of": 1, "right_of": 1, "above": 1, "below": 1, "nearest": 1, "be
 
 
 def _confused(a: Choice, b: Choice) -> bool:
-    """Whether colour and noun do not tell them apart."""
+    """Return whether colour and noun fail to tell the two apart."""
     return a[0] is b[0] and (a[1] == b[1] or not a[0].by_colour)
 
 
-def _leads(choice: Choice, kind: str) -> bool:
+def _can_be_target(choice: Choice, kind: str) -> bool:
     if kind == "round":
         return make_one(choice).roundness >= 0.87
     return kind != "long" or make_one(choice).stretch >= 2.2
 
 
-def _leaves(choice: Choice, first: Choice, kind: str) -> bool:
-    """Whether such a thing may stand beside the target."""
+def _can_stand_beside(choice: Choice, first: Choice, kind: str) -> bool:
+    """Return whether such a thing may be in the scene of the target."""
     if kind == "round":
         return make_one(choice).roundish <= 0.72
     if kind == "long":
@@ -305,13 +308,13 @@ def _leaves(choice: Choice, first: Choice, kind: str) -> bool:
 
 
 BESIDE = {"left_of": (0, -1), "right_of": (0, 1), "above": (1, -1), "below": (1, 1)}
-"""Axis and direction."""
+"""Axis (0 for x, 1 for y) and direction."""
 
 
 def _on_one_side(
     random: Generator, where: Stage, things: list[Thing], turns: list[float], axis: int, sign: int
 ) -> list[Thing] | None:
-    """The first thing on one side of the second; of its own sort, no other on that side."""
+    """Place the first thing on one side of the second, with no other of its sort on that side."""
     along, across = random.uniform(0.3, 0.45), random.uniform(0.3, 0.7)
     spots: list[Point] = []
     for share, off in ((random.uniform(0.1, 0.18), random.uniform(-0.1, 0.1)), (along, 0.0)):
@@ -334,7 +337,7 @@ def _on_one_side(
 
 
 def _anchors(random: Generator, where: Stage, kind: str) -> dict[int, Point]:
-    """Places of the first things where the kind is about a place."""
+    """Return places of the first things, by index, if the kind is about a place."""
     w, h = where.size
     if kind == "middle":
         return {0: (w * random.uniform(0.46, 0.54), h * random.uniform(0.46, 0.54))}
@@ -352,8 +355,8 @@ def _anchors(random: Generator, where: Stage, kind: str) -> dict[int, Point]:
 def _enclosed(
     random: Generator, where: Stage, choices: list[Choice], things: list[Thing], turns: list[float]
 ) -> list[Thing] | None:
-    """The first thing within one that encloses it, the others elsewhere."""
-    around = _some(random, [c for c in choices if c[0].encloses])
+    """Place the first thing within one that encloses it, the others elsewhere; None if it fails."""
+    around = _pick(random, [c for c in choices if c[0].encloses])
     if around is None:
         return None
     inner = things[0]

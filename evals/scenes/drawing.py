@@ -1,4 +1,4 @@
-"""What the drawings of things share: regions of one colour, darker edges, plain shapes."""
+"""Helpers for drawing things: regions of one colour, darker edges, plain shapes."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ GLASS: RGB = (38, 46, 58)
 
 
 def plain(shape: Callable[[Generator], Polygon]) -> Draw:
-    """One colour, with a darker edge at times."""
+    """Return a drawing of a shape in one colour, with a darker edge at times."""
 
     def parts(random: Generator, colour: RGB) -> list[Part]:
         outline = shape(random)
@@ -30,13 +30,13 @@ def plain(shape: Callable[[Generator], Polygon]) -> Draw:
 
 
 def edged(outline: Polygon, colour: RGB, width: float, dark: float) -> list[Part]:
-    """A darker edge, `width` of the size wide, around the colour."""
+    """Return an outline in a colour with a darker edge, `width` of the size wide."""
     inner = outline.buffer(-width * math.sqrt(outline.area))
     return [Part(outline, lit(colour, dark)), Part(inner, colour)]
 
 
 def boarded(ratio: float, dark: float, boards: Sequence[Polygon], colour: RGB) -> list[Part]:
-    """Boards on a darker rectangle, 1 high and `ratio` long."""
+    """Return boards on a darker rectangle, 1 high and `ratio` long."""
     return [
         Part(shapes.rectangle(ratio), lit(colour, dark)),
         Part(shapely.union_all(boards), colour),
@@ -46,7 +46,7 @@ def boarded(ratio: float, dark: float, boards: Sequence[Polygon], colour: RGB) -
 def dots_around(
     random: Generator, count: int, far: tuple[float, float], radius: float
 ) -> list[Polygon]:
-    """Discs at random turns about the origin, between two distances from it."""
+    """Return discs at random angles about the origin, between two distances from it."""
     turns, radii = random.uniform(0, 6.3, count), random.uniform(*far, count)
     return [
         shapes.circle(radius, r * math.cos(t), r * math.sin(t))
@@ -55,5 +55,5 @@ def dots_around(
 
 
 def shrunk(outline: BaseGeometry, share: float) -> BaseGeometry:
-    """Scaled about its middle."""
+    """Return the outline scaled about its middle."""
     return affinity.scale(outline, share, share)

@@ -1,6 +1,6 @@
 """The families of scenes: which things there are, in which colours, on which ground.
 
-They are listed in families.yaml; this puts the functions that draw them in the place of names.
+They are listed in families.yaml; this module replaces names by the functions that draw them.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ from .things import Family, Sort
 
 
 def _drawing(name: str, *sizes: float | list[float]) -> Draw:
-    """A drawing by its name, or an outline by its name and sizes."""
+    """Return a drawing by its name, or one that draws an outline by its name and sizes."""
     for room in (indoors, outdoors):
         if name in vars(room):
             return getattr(room, name)

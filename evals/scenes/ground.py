@@ -1,4 +1,4 @@
-"""Grounds of the families: a texture in a fitting colour, with marks that are no things."""
+"""Grounds of the families: a texture in a fitting colour, with marks that count as no things."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ def _near_colour(random: Generator, colour: RGB, spread: float) -> RGB:
 
 
 def _one_of(random: Generator, material: str, spread: float) -> RGB:
-    """A colour of that material, each channel up to the share `spread` off."""
+    """Return a colour of that material, each channel up to the share `spread` off."""
     colours = _COLOURS[material]
     return _near_colour(random, colours[random.integers(len(colours))], spread)
 

@@ -1,4 +1,4 @@
-"""Drawings of what lies on tables and floors; the first part is the whole outline."""
+"""Drawings of things on tables and floors; the first part is the whole outline."""
 
 import math
 from itertools import pairwise

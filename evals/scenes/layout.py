@@ -1,4 +1,4 @@
-"""Puts things into the picture: scattered, in rows, or all but one in a cluster.
+"""Placement of things in the picture: scattered or in rows.
 
 Things keep half the larger one's size from each other, and room for a ring from the border.
 """
@@ -16,7 +16,7 @@ from ...tools.formation.contract import CLEARANCE_SHARE, MIN_CLEARANCE
 from .things import Thing
 
 GAP = 0.52
-"""Least gap of two things, as a share of the larger one's size."""
+"""Least gap between two things, as a share of the larger one's size."""
 TRIES = 60
 Point = tuple[float, float]
 
@@ -32,12 +32,12 @@ class Rows:
 
 
 def clearance(thing: Thing) -> float:
-    """How far from a thing its robots stand by default, px."""
+    """Return how far from a thing its robots stand by default, px."""
     return max(MIN_CLEARANCE, CLEARANCE_SHARE * thing.size)
 
 
 def room(thing: Thing, size: tuple[int, int]) -> float:
-    """Distance of a thing's box from the nearest border, px."""
+    """Return the distance of a thing's bounding box from the nearest border, px."""
     x0, y0, x1, y1 = thing.polygon.bounds
     return min(x0, y0, size[0] - 1 - x1, size[1] - 1 - y1)
 
@@ -50,14 +50,14 @@ def scatter(
     anchors: Mapping[int, Point],
     taken: Sequence[Thing] = (),
 ) -> list[Thing] | None:
-    """The things at random places of an area; those without a place are left out.
+    """Place things at random in an area; those that find no place are left out.
 
     Args:
         area: x0, y0, x1, y1 that holds them with room for a ring.
         things: about the origin.
         turns: degrees, one per thing.
-        anchors: places of some by index; None is returned where one of these cannot be had.
-        taken: things that are there already.
+        anchors: fixed places of some by index; None is returned if one of these is not free.
+        taken: things that are placed already.
     """
     placed: dict[int, Thing] = {}
     order = sorted(range(len(things)), key=lambda i: (i not in anchors, -things[i].size))
@@ -109,10 +109,10 @@ def rows(
     turn: float,
     turns: Sequence[float],
 ) -> Rows | None:
-    """The things on cells of a grid turned by `turn`, or None where the area is too small.
+    """Place things on cells of a grid turned by `turn`; None if the area is too small.
 
     Args:
-        turns: degrees of each thing against the grid.
+        turns: degrees of each thing relative to the grid.
     """
     gap = GAP * max(thing.size for thing in things) + 2
     spans = np.array(
@@ -146,5 +146,5 @@ def rows(
 
 
 def nearest_gap(thing: Thing, others: Sequence[Thing]) -> float:
-    """Distance to the nearest other thing's outline, px; infinite where there is none."""
+    """Return the distance to the nearest other thing's outline, px; infinite if there is none."""
     return min((thing.polygon.distance(other.polygon) for other in others), default=math.inf)

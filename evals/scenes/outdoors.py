@@ -1,4 +1,4 @@
-"""Drawings of what stands outdoors: cars, gardens, boats; the first part is the whole outline."""
+"""Drawings of things outdoors: cars, gardens, boats; the first part is the whole outline."""
 
 import numpy as np
 import shapely
@@ -137,7 +137,7 @@ def bench(random: Generator, colour: RGB) -> list[Part]:
 
 
 def hedge(random: Generator, colour: RGB) -> list[Part]:
-    """A hedge cut to a C."""
+    """A hedge cut in the shape of a C."""
     outline = shapes.cee(random.uniform(0.4, 0.5), random.uniform(70, 110))
     tufts = dots_around(random, 40, (0.6, 0.95), 0.07)
     return [

@@ -1,7 +1,7 @@
-"""Draws a scene: ground, marks, shadows, things, light and camera, each with its own random stream.
+"""Drawing of a scene: ground, marks, shadows, things, light and camera.
 
-Three pixels of the drawing make one of the picture; pixel x of the picture is centred on
-pixel 3 x + 1 of the drawing.
+Ground, things and camera have random streams of their own. Three pixels of the drawing make one
+of the picture; pixel x of the picture is centred on pixel 3 x + 1 of the drawing.
 """
 
 import io
@@ -24,7 +24,7 @@ Size = tuple[int, int]
 
 
 def draw(scene: Scene) -> Image.Image:
-    """The picture of a scene, RGB; the same scene gives the same pixels."""
+    """Draw the picture of a scene, RGB; the same scene gives the same pixels."""
     ground_random, thing_random, camera_random = (
         np.random.default_rng([scene.seed, 1, step]) for step in range(3)
     )
@@ -47,7 +47,7 @@ def draw(scene: Scene) -> Image.Image:
 
 
 def layer(size: Size, parts: Iterable[Part]) -> tuple[Floats, Floats]:
-    """Colour (h, w, 3) and cover (h, w), 0 to 1, of parts drawn one over the other."""
+    """Return the colour (h, w, 3) and cover (h, w), 0 to 1, of parts drawn one over the other."""
     fine = Image.new("RGBA", (FINE * size[0], FINE * size[1]))
     pen = ImageDraw.Draw(fine)
     for part in parts:
@@ -107,7 +107,7 @@ def _to_image(canvas: Floats) -> Image.Image:
 
 
 def _smooth(random: Generator, size: Size, across: float, down: float | None = None) -> Floats:
-    """Noise, -0.5 to 0.5, whose spots are this many pixels wide and high."""
+    """Return noise, -0.5 to 0.5, (h, w), whose spots are so many pixels wide and high."""
     w, h = math.ceil(size[0] / across) + 3, math.ceil(size[1] / (down or across)) + 3
     coarse = Image.fromarray(random.random((h, w), dtype=np.float32) - 0.5)
     wide, high = math.ceil(w * across), math.ceil(h * (down or across))
@@ -145,7 +145,7 @@ def _tiles(random: Generator, size: Size, colour: RGB) -> Floats:
 
 
 def _joints(random: Generator, size: Size, width: int) -> Floats:
-    """1 on the joints of a grid of slabs."""
+    """Return an image (h, w) that is 1 on the joints of a grid of slabs, else 0."""
     cell, shift = int(random.integers(70, 170)), random.integers(0, 70, 2)
     x, y = np.arange(size[0]) + shift[0], np.arange(size[1]) + shift[1]
     joint = (x[None] % cell < width) | (y[:, None] % cell < width)

@@ -9,7 +9,7 @@ RGB = tuple[float, float, float]
 """Red, green, blue, 0 to 255."""
 
 VISIBLE = 22.0
-"""Least difference of a thing from its ground that a person sees at a glance, CIELAB units."""
+"""Least difference from the ground at which a person sees a thing at a glance, CIELAB units."""
 
 NAMED: dict[str, tuple[tuple[float, float], tuple[float, float], tuple[float, float]]] = {
     "red": ((-6, 5), (0.78, 0.95), (0.68, 0.88)),
@@ -28,21 +28,21 @@ NAMED: dict[str, tuple[tuple[float, float], tuple[float, float], tuple[float, fl
 
 
 def shade(random: Generator, name: str) -> RGB:
-    """Some colour of that name."""
+    """Return a random colour of that name."""
     hue, saturation, value = (random.uniform(low, high) for low, high in NAMED[name])
     red, green, blue = colorsys.hsv_to_rgb(hue / 360 % 1, saturation, value)
     return 255 * red, 255 * green, 255 * blue
 
 
 def lit(colour: RGB, factor: float) -> RGB:
-    """The colour under more (factor > 1) or less light; more whitens what is dark as well."""
+    """Return the colour under more (factor > 1) or less light; more light whitens dark colours."""
     lift = 30 * max(factor - 1, 0)
     red, green, blue = (min(max(channel * factor + lift, 0), 255) for channel in colour)
     return red, green, blue
 
 
 def difference(a: RGB, b: RGB) -> float:
-    """Distance in CIELAB (CIE 1976): 2 is just visible, 100 is black against white."""
+    """Return the distance in CIELAB (CIE 1976): 2 is just visible, 100 is black against white."""
     return math.dist(_lab(a), _lab(b))
 
 

@@ -1,6 +1,6 @@
 """Outlines of things as polygons about the origin, in units of their own.
 
-Frame: x right, y down, as in a picture; who uses one scales, turns and moves it.
+Frame: x right, y down, as in a picture; the caller scales, turns and moves them.
 """
 
 import math
@@ -14,7 +14,7 @@ from shapely.geometry import Point, Polygon, box
 
 
 def polar(radii: Sequence[float] | np.ndarray) -> Polygon:
-    """Points at these distances from the origin, at even turns from the top."""
+    """A polygon with corners at these distances from the origin, at even angles from the top."""
     turns = np.linspace(0, 2 * math.pi, len(radii), endpoint=False) - math.pi / 2
     return Polygon(np.stack([np.cos(turns), np.sin(turns)], axis=1) * np.asarray(radii)[:, None])
 
@@ -80,7 +80,7 @@ def heart() -> Polygon:
 
 
 def crescent(depth: float) -> Polygon:
-    """A moon: a disc less a smaller one that starts `depth` from its far side."""
+    """A moon: a disc less a smaller one that reaches `depth` beyond its right side."""
     return _one_polygon(circle().difference(circle(0.85, 0.15 + depth, 0)))
 
 
@@ -114,7 +114,7 @@ def capsule(ratio: float) -> Polygon:
 
 
 def hull(ratio: float, stern: float) -> Polygon:
-    """A boat from above, its bow to the right and its stern cut off at this share of the beam."""
+    """A boat from above, its bow to the right; its stern is this share of the beam wide."""
     along = np.linspace(0, 1, 24)
     half = 0.5 * np.minimum(stern + 1.6 * along, 1) * (1 - along**2.6)
     upper = np.stack([ratio * (along - 0.5), -half], axis=1)
@@ -122,7 +122,7 @@ def hull(ratio: float, stern: float) -> Polygon:
 
 
 def blob(random: Generator, roughness: float) -> Polygon:
-    """A smooth irregular round, such as a pond."""
+    """A smooth, irregular round shape, such as a pond."""
     turns = np.linspace(0, 2 * math.pi, 90, endpoint=False)
     radii = np.ones(90)
     for wave in range(2, 6):
@@ -132,13 +132,13 @@ def blob(random: Generator, roughness: float) -> Polygon:
 
 
 def scalloped(bumps: int, depth: float) -> Polygon:
-    """A round with bumps, such as a bush."""
+    """A round shape with bumps, such as a bush."""
     turns = np.linspace(0, math.pi * bumps, 12 * bumps, endpoint=False)
     return polar(1 + depth * np.abs(np.sin(turns)))
 
 
 def union(polygons: Iterable[Polygon]) -> Polygon:
-    """All of them as one, which they must be."""
+    """The union of polygons, which must be a single polygon."""
     return _one_polygon(shapely.union_all(list(polygons)))
 
 

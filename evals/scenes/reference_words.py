@@ -1,7 +1,8 @@
-"""Which words tell one thing from all others, decided by wide margins.
+"""Words that tell one thing from all others, decided by wide margins.
 
-Each kind of reference is a rule on (thing, the others of its group, the whole view): it gives
-the words that fill its template where it is beyond doubt, and None elsewhere.
+Each kind of reference is a rule on (thing, the others of its group, the whole view): it returns
+the words that fill its template if it applies beyond doubt, else None. Those without words
+return whether they apply.
 """
 
 import math
@@ -13,7 +14,7 @@ from .layout import nearest_gap
 from .things import Thing
 
 AREA_RATIO = 1.45
-"""Least ratio of areas between the largest and the next."""
+"""Least ratio of the areas of the largest thing and the next."""
 GENERAL = ("thing", "object", "item", "piece")
 Slots = dict[str, str]
 
@@ -27,7 +28,7 @@ class View:
 
     @property
     def margin(self) -> float:
-        """By how much one thing must lie further along than another to count, px."""
+        """How much further along than another a thing must lie to count as such, px."""
         return max(42.0, 0.062 * self.size[0])
 
 
@@ -35,7 +36,7 @@ Rule = Callable[[Thing, list[Thing], View], Slots | bool | None]
 
 
 def reference_slots(kind: str, thing: Thing, group: Sequence[Thing], view: View) -> Slots | None:
-    """What fills the template of that kind for a thing of a group, or None where it is unclear."""
+    """Return what fills the template of a kind for a thing of a group; None if it is unclear."""
     found = _RULES[kind](thing, [t for t in group if t is not thing], view)
     if found is None or isinstance(found, dict):
         return found
@@ -54,7 +55,7 @@ def _by_shape(thing: Thing, others: list[Thing], view: View) -> Slots | None:
 
 
 def goes_by(other: Thing, thing: Thing) -> bool:
-    """Whether someone might call the other by the thing's noun."""
+    """Return whether someone might call the other thing by this one's noun."""
     return other.sort.noun in (thing.sort.noun, *thing.sort.also)
 
 
@@ -83,7 +84,7 @@ def _larger_of_colour(thing: Thing, others: list[Thing], view: View) -> Slots | 
 
 
 def _along_axis(thing: Thing, axis: int, sign: int) -> tuple[float, float]:
-    """Centre and far edge of a thing, growing in that direction."""
+    """Return the centre and far edge of a thing along an axis, growing towards `sign`."""
     bounds = thing.polygon.bounds
     edge = bounds[axis + 2] if sign > 0 else bounds[axis]
     return sign * thing.place[axis], sign * edge
@@ -102,7 +103,7 @@ def _second(sign: int, thing: Thing, others: list[Thing], view: View) -> bool:
 
 
 def phrase(thing: Thing, view: View) -> str | None:
-    """A definite phrase for a thing by its noun, or colour and noun; None where neither tells."""
+    """Return a definite phrase by noun, or colour and noun; None if neither tells the thing."""
     named = [t for t in view.things if t is not thing and goes_by(t, thing)]
     if not named:
         return f"the {thing.sort.noun}"
@@ -114,7 +115,7 @@ def phrase(thing: Thing, view: View) -> str | None:
 def _beside_another(
     axis: int, sign: int, thing: Thing, others: list[Thing], view: View
 ) -> Slots | None:
-    """The only one of its group on that side of another thing."""
+    """Return the slots if it is the only one of its group on that side of another thing."""
     for other in view.things:
         words = phrase(other, view) if other is not thing else None
         rest = [t for t in others if t is not other]
@@ -176,7 +177,7 @@ def _between_two(thing: Thing, others: list[Thing], view: View) -> Slots | None:
 
 
 def _station(thing: Thing, a: Thing, b: Thing) -> tuple[float, float]:
-    """Where a thing lies along the line from a to b and how far off it, as shares of its length."""
+    """Return how far along and how far off the line from a to b a thing is, over its length."""
     (ax, ay), (bx, by), (x, y) = a.place, b.place, thing.place
     dx, dy = bx - ax, by - ay
     length = max(dx * dx + dy * dy, 1e-9)

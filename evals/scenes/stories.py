@@ -1,7 +1,7 @@
-"""Makes the drawn scene of a seed, with its task and success rule, in the photographs' format.
+"""The drawn scene of a seed, with its task and success rule, in the photographs' format.
 
-Every 54 seeds, from a multiple of 54 on, hold each of the paper's nine cells (category x setup)
-with each family once. The words are drawn apart from the picture: new ones change no pixel.
+Each 54 seeds, from a multiple of 54 on, have each of the paper's nine cells (category x setup)
+with each family once. Words have a random stream of their own, so that new ones change no pixel.
 """
 
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ from .things import Family, Scene, Thing
 
 CELLS = tuple(product(("general", "infill", "caging"), ("single", "multi", "hidden")))
 SHARES = {"single": (0.01, 0.15), "multi": (0.004, 0.08), "hidden": (0.004, 0.08)}
-"""Share of the picture a target may have."""
+"""Least and largest share of the picture that a target may cover."""
 FRESH = 1 / 3
 ATTEMPTS = 25
 Words = dict[str, dict[str, list[str]]]
-"""Templates by what they are for, arrangements or referring, and by its kind."""
+"""Templates by purpose, arrangements or referring, and by kind."""
 COUNTS = "one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen"
 NUMBERS = (*COUNTS.split(), "sixteen", "seventeen", "eighteen", "nineteen", "twenty")
 
 
 @dataclass(frozen=True)
 class Story:
-    """A scene, which of its things is meant, and the words that say so."""
+    """A scene, the thing that is meant, and the words that say so."""
 
     scene: Scene
     category: str
@@ -45,12 +45,12 @@ class Story:
 
 
 def family_of(seed: int) -> Family:
-    """The family a seed's scene is of."""
+    """Return the family of a seed's scene."""
     return FAMILIES[(seed // 9 + seed % 9) % 6]
 
 
 def story_of(seed: int) -> Story:
-    """The scene of a seed, undrawn, and what is asked of it."""
+    """Compose the scene of a seed, without drawing it, and choose what is asked of it."""
     category, setup = CELLS[seed % 9]
     family = family_of(seed)
     random = np.random.default_rng([seed, 0])
@@ -72,7 +72,7 @@ def story_of(seed: int) -> Story:
 def _fitting(
     random: Generator, scene: Scene, kind: str, category: str, setup: str
 ) -> list[tuple[Thing, Slots]]:
-    """The things robots can be sent to that the kind tells, and the words that fill it."""
+    """Return the things robots can be sent to that the kind tells apart, with the words for it."""
     view, general = View(scene.things, scene.size), random.random() < 0.5
     low, high = (share * scene.size[0] * scene.size[1] for share in SHARES[setup])
     word = str(random.choice((*GENERAL, "shape") if scene.family == "shapes" else GENERAL))
@@ -93,14 +93,14 @@ def _fitting(
 
 
 def standable(thing: Thing, scene: Scene) -> bool:
-    """Whether robots can stand around a thing: room to the border and to other things."""
+    """Return whether robots can stand around a thing: room to the border and to other things."""
     others = [t for t in scene.things if t is not thing]
     free = nearest_gap(thing, others) >= (GAP - 0.02) * thing.size
     return free and not thing.sort.encloses and room(thing, scene.size) >= clearance(thing) + 2
 
 
 def entry_of(story: Story) -> dict[str, Any]:
-    """The entry of annotations.json: exact outlines, the instruction and its success rule."""
+    """Return the entry of annotations.json: exact outlines, instruction and success rule."""
     random = np.random.default_rng([story.scene.seed, 2])
     fitting = arrangements(story.target, story.category)
     arrangement = fitting[random.integers(len(fitting))]
@@ -135,7 +135,7 @@ def entry_of(story: Story) -> dict[str, Any]:
 
 
 def retasked(story: Story, **changes: Any) -> dict[str, Any]:
-    """The entry of a story with these parts of its task changed."""
+    """Return the entry of a story with these parts of its task changed."""
     entry = entry_of(story)
     entry["tasks"][0] |= changes
     return entry
@@ -168,7 +168,7 @@ def _instruction_of(
 
 
 def named(random: Generator, story: Story, words: Words | None = None) -> str:
-    """A phrase that says which thing is meant, in the known wordings if none are given."""
+    """Return a phrase that says which thing is meant, by default in the known wordings."""
     kind = story.kind
     if kind in ("odd_colour", "odd_size", "odd_shape") and random.random() < 0.5:
         kind = "odd"
@@ -178,7 +178,7 @@ def named(random: Generator, story: Story, words: Words | None = None) -> str:
 
 @cache
 def wordings() -> list[Words]:
-    """The known wordings, and the fresh ones where there are any."""
+    """Return the known wordings, and the fresh ones if there are any."""
     here = Path(__file__).parent
     paths = [here / "wordings.yaml", here / "fresh.yaml"]
     return [yaml.safe_load(path.read_text(encoding="utf-8")) for path in paths if path.is_file()]

@@ -1,4 +1,4 @@
-"""Success rules for a true outline, by the proportions the rules of the photographs have."""
+"""Success rules for true outlines, in the proportions of the photographs' rules."""
 
 import math
 from typing import Any
@@ -9,13 +9,13 @@ from .layout import clearance
 from .things import Thing
 
 SIDES = {"left": "left", "right": "right", "upper": "top", "lower": "bottom"}
-"""The words for a side, and the rule's."""
+"""The words for a side in an instruction, and the rule's word for it."""
 PARTING = 11.0
-"""Least distance of neighbours at which a count of robots is asked for, px."""
+"""Least distance between neighbours when a number of robots is chosen, px."""
 
 
 def arrangements(thing: Thing, category: str) -> list[str]:
-    """The arrangements that make sense for a thing, more likely ones repeated."""
+    """Return the arrangements that make sense for a thing, likelier ones repeated."""
     if category == "caging":
         return ["cage"]
     if category == "infill":
@@ -32,7 +32,7 @@ def arrangements(thing: Thing, category: str) -> list[str]:
 
 
 def robots_for(random: Generator, thing: Thing, arrangement: str) -> int:
-    """A count of robots that fits the thing."""
+    """Choose a number of robots that fits the thing."""
     if arrangement == "corners":
         return thing.sort.corners
     if arrangement == "centre":
@@ -52,7 +52,7 @@ def robots_for(random: Generator, thing: Thing, arrangement: str) -> int:
 
 
 def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str, Any]:
-    """The rule; `side` counts for that arrangement only."""
+    """Return the success rule of an arrangement; `side` matters for "side" only."""
     size = thing.size
     if arrangement in ("around", "cage"):
         closed = arrangement == "cage"
@@ -96,7 +96,7 @@ def success(thing: Thing, arrangement: str, robots: int, side: str) -> dict[str,
 
 
 def slack(thing: Thing, arrangement: str) -> float:
-    """How much wider than an even ring's a gap may be."""
+    """Return how many times as wide as an even ring's a gap may be."""
     if arrangement == "around":
         return 2.0
     return 1.8 if thing.hollow else 1.6

@@ -28,13 +28,13 @@ class Sort:
     """A sort of thing.
 
     Attributes:
-        draw: makes the parts from a colour, in units of their own; the first one is the outline.
-        corners: how many a person would count; 0 where that is no sensible question.
+        draw: makes the parts from a colour, in arbitrary units; the first part is the outline.
+        corners: how many a person would count; 0 if that is no sensible question.
         by_colour: whether a person would name it by its colour.
-        upright: whether one sees how it is turned.
-        scale: its usual size against other things of the scene.
+        upright: whether one can see how it is turned.
+        scale: its usual size relative to other things of the scene.
         is_shape: whether its noun is the word for a shape.
-        also: nouns of other things that some would call by this one.
+        also: nouns of other things that some people would call by this noun.
     """
 
     noun: str
@@ -52,7 +52,7 @@ class Sort:
 
 @dataclass(frozen=True)
 class Thing:
-    """A thing in a picture: pixels, x right, y down, pixel centres at whole numbers."""
+    """A thing in a picture, in pixels: x right, y down, pixel centres at whole numbers."""
 
     sort: Sort
     colour: str
@@ -68,12 +68,12 @@ class Thing:
 
     @cached_property
     def outline(self) -> Outline:
-        """The outline as the planner would know it."""
+        """The outline in the form that the planner works with."""
         return outline_of(self.polygon)
 
     @cached_property
     def area(self) -> float:
-        """Square pixels, holes filled."""
+        """Area in square pixels, holes filled."""
         return Polygon(self.polygon.exterior).area
 
     @property
@@ -83,7 +83,7 @@ class Thing:
 
     @cached_property
     def place(self) -> tuple[float, float]:
-        """Where a person would say it is: the middle of its box."""
+        """Where a person would say it is: the middle of its bounding box, (x, y) px."""
         x0, y0, x1, y1 = self.polygon.bounds
         return (x0 + x1) / 2, (y0 + y1) / 2
 
@@ -101,7 +101,7 @@ class Thing:
 
     @cached_property
     def roundish(self) -> float:
-        """The same of its convex hull without thin things that stick out: a mug's handle."""
+        """Roundness of its convex hull without thin things that stick out: a mug's handle."""
         reach = 0.17 * self.size
         bulk = Polygon(self.polygon.exterior).buffer(-reach).buffer(reach)
         hull = (self.polygon if bulk.is_empty else bulk).convex_hull
@@ -114,11 +114,11 @@ class Thing:
 
     @property
     def hollow(self) -> bool:
-        """Whether robots in a recess of it come between others when counted around its hull."""
+        """Whether robots in a recess of it would come between others in order around its hull."""
         return self.area < 0.8 * self.polygon.convex_hull.area
 
     def moved(self, x: float, y: float, turn: float) -> "Thing":
-        """Turned by degrees about its centroid and put there."""
+        """Return it turned by degrees about the origin, where it was made, and put at (x, y)."""
         c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
         matrix = [c, -s, s, c, x, y]
         parts = tuple(
@@ -130,9 +130,9 @@ class Thing:
 def make(
     random: Generator, sort: Sort, colour: str, size: float, paint: RGB | None = None
 ) -> Thing:
-    """A thing about the origin whose outline, holes filled, has the area size x size.
+    """Make a thing about the origin whose outline, holes filled, has the area size x size.
 
-    `paint` is the very colour of that name, left out: any.
+    `paint` is the exact colour; by default a random one of the name `colour`.
     """
     parts = sort.draw(random, paint or shade(random, colour))
     outline = parts[0].region
@@ -154,11 +154,11 @@ def make(
 
 @dataclass(frozen=True)
 class Look:
-    """How the camera saw it.
+    """How the camera saw a scene.
 
     Attributes:
         shadow: offset (x, y) of cast shadows and their blur, px, and strength; None for none.
-        light: brightness falling from 1 + light to 1 - light along `way`, degrees.
+        light: brightness rises from 1 - light to 1 + light, at most, towards `way`, degrees.
         grain: strength of the texture on things.
         noise: standard deviation of the sensor's noise, grey levels.
         blur: standard deviation, px.
@@ -185,7 +185,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Scene:
-    """All there is to draw."""
+    """All that is drawn."""
 
     seed: int
     family: str
@@ -203,7 +203,7 @@ class Family:
         turns: how things lie: "aligned" to one direction, "free", or "either".
         rows: how often they stand in rows.
         bays: whether those rows are painted on the ground.
-        beyond: kinds of reference its things cannot be told by.
+        beyond: kinds of reference that cannot tell its things apart.
     """
 
     name: str

@@ -1,7 +1,7 @@
-"""The results of a suite by cell (category x setup) and style: counts, intervals, chance levels.
+"""Results of a suite by cell (category x setup) and style: counts, intervals, chance levels.
 
-Intervals are Wilson's: of these tasks, not of new ones. Infrastructure errors are left out and
-counted.
+Intervals are Wilson's and hold for these tasks, not for new ones. Infrastructure errors are left
+out, but counted.
 """
 
 from collections.abc import Iterable, Sequence
@@ -30,23 +30,24 @@ class Chance:
 
 @dataclass(frozen=True)
 class Cell:
-    """Trials that belong together.
+    """Results of trials that belong together.
 
     Attributes:
         name: category and setup, one of them, a style, or total.
         tasks: how many.
         passed: successes, k.
         scored: trials, n.
-        interval: of the success rate at 95 %, of these tasks.
+        interval: of the success rate at 95 %, on these tasks.
         gcr: mean.
         strict: successes at the tighter tolerances.
-        placed: trials in which robots were placed; of these passed, and of those of which it is
-            known about the thing meant: (right, known).
-        iou: mean overlap of the outlines measured with the true ones.
-        e95: mean of their boundary errors.
+        placed: trials in which robots were placed; `placed_passed` of them succeeded.
+        right_thing: (right, known): trials that placed robots about the thing meant, of those
+            for which it is known.
+        iou: mean overlap of the outlines measured with the true ones; None if none were.
+        e95: mean of their boundary errors; None if there were none.
         invalid: trials whose output could not be used.
         lost: infrastructure errors.
-        chance: of these tasks.
+        chance: the chance level on these tasks.
     """
 
     name: str
@@ -67,7 +68,7 @@ class Cell:
 
 
 def chances(tasks: Sequence[Task]) -> dict[str, Chance]:
-    """The chance level of every cell that has tasks, by name."""
+    """Return the chance level of every cell that has tasks, by name."""
     return {
         name: Chance(*chance([task.goals for task in tasks if name in cell_names(task)]))
         for name in _ordered_names(tasks)
@@ -75,11 +76,11 @@ def chances(tasks: Sequence[Task]) -> dict[str, Chance]:
 
 
 def cells(rows: Sequence[TrialRow], levels: dict[str, Chance]) -> list[Cell]:
-    """The cells of one arm's rows that have any.
+    """Return the cells of one arm, those without rows left out.
 
     Args:
         rows: of one arm.
-        levels: chance by name of cell.
+        levels: chance levels by name of cell.
     """
     return [
         _cell(name, [row for row in rows if name in cell_names(row)], levels[name])
@@ -88,13 +89,13 @@ def cells(rows: Sequence[TrialRow], levels: dict[str, Chance]) -> list[Cell]:
 
 
 def cell_names(of: Task | Trial) -> list[str]:
-    """The cells that a task or trial belongs to."""
+    """Return the names of the cells that a task or trial belongs to."""
     both = f"{of.category} {of.setup}"
     return [name for name in (both, of.category, of.setup, of.style, TOTAL) if name]
 
 
 def _ordered_names(there: Iterable[Task | Trial]) -> list[str]:
-    """All cells: the paper's, then styles, then the total."""
+    """Return the names of all cells: the paper's, then styles, then the total."""
     names = {name for of in there for name in cell_names(of)} - {TOTAL}
     known = [name for name in ORDER if name in names]
     return [*known, *sorted(names.difference(known)), TOTAL]

@@ -16,11 +16,11 @@ import numpy as np
 from ...tools.geometry.outline import FloatArray
 
 ICC = 0.3
-"""Share of a trial's variance that is its task's, taken where data cannot show it."""
+"""Share of a trial's variance that is due to its task, assumed where data cannot show it."""
 EXACT = 16
-"""Most differences whose sign flips are all tried."""
+"""Up to this many differences all sign flips are tried."""
 DRAWS = 20_000
-"""Sign flips drawn where there are more; p is then known to about .003."""
+"""Sign flips drawn at random if there are more; p is then known to about .003."""
 CHUNK = 2_000
 TINY = 1e-9
 
@@ -33,10 +33,10 @@ class Interval(NamedTuple):
 
 
 def wilson(k: float, n: float, level: float = 0.95) -> Interval:
-    """Wilson's score interval for a share (Wilson 1927).
+    """Return Wilson's score interval for a share (Wilson 1927).
 
     Args:
-        k: successes, 0 to n; a fraction where n is an effective number.
+        k: successes, 0 to n; a fraction if n is an effective number.
         n: trials, above 0.
     """
     z = NormalDist().inv_cdf((1 + level) / 2)
@@ -47,7 +47,7 @@ def wilson(k: float, n: float, level: float = 0.95) -> Interval:
 
 
 def effective_trials(counts: FloatArray, icc: float = ICC) -> float:
-    """How many independent trials the trials of these tasks are worth (Kish's design effect).
+    """Return how many independent trials the trials of tasks are worth (Kish's design effect).
 
     Args:
         counts: trials of each task, (T,).
@@ -56,10 +56,10 @@ def effective_trials(counts: FloatArray, icc: float = ICC) -> float:
 
 
 def logit_t(means: FloatArray, counts: FloatArray, level: float = 0.95) -> Interval:
-    """Interval of the success on new tasks: Student's t on task means, on the logit scale.
+    """Return the interval of the success on new tasks: Student's t on the logits of task means.
 
-    Where all tasks have the same mean their spread shows nothing; then Wilson's interval with the
-    effective number of trials.
+    If all tasks have the same mean, their spread shows nothing; then it is Wilson's interval with
+    the effective number of trials.
 
     Args:
         means: success of each task, 0 to 1, (T,).
@@ -76,27 +76,27 @@ def logit_t(means: FloatArray, counts: FloatArray, level: float = 0.95) -> Inter
 
 
 def standard_error(values: FloatArray) -> float:
-    """Of the mean of (T,) values; 0 for a single one."""
+    """Return the standard error of the mean of (T,) values; 0 for a single one."""
     return float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
 
 
 def least_error(pairs: float) -> float:
-    """Standard error that a mean difference of so many pairs of trials has at least.
+    """Return the least standard error to assume for a mean difference of so many pairs of trials.
 
-    It is that of one pair each way among two more pairs (Bonett and Price 2012): identical results
+    It is that of two more pairs, one differing each way (Bonett and Price 2012): identical results
     of few trials do not prove that two versions are alike.
     """
     return math.sqrt(2) / (pairs + 2)
 
 
 def paired_t(differences: FloatArray, level: float = 0.95, least: float = 0.0) -> Interval:
-    """Interval of the mean difference on new tasks; unbounded for a single task.
+    """Return the interval of the mean difference on new tasks; unbounded for a single task.
 
     The ends at level .90 are the one-sided bounds at 95 %.
 
     Args:
         differences: of task means, (T,).
-        least: standard error taken at least.
+        least: the least standard error to assume.
     """
     if len(differences) < 2:
         return Interval(-math.inf, math.inf)
@@ -106,11 +106,11 @@ def paired_t(differences: FloatArray, level: float = 0.95, least: float = 0.0) -
 
 
 def sign_flips(differences: FloatArray, seed: int = 0) -> float:
-    """Two-sided p of a paired permutation test: by chance alone each difference has either sign.
+    """Return the two-sided p of a paired permutation test, in which chance flips signs.
 
-    With differences of task means it is the new-task claim. With differences of paired trials it
-    permutes labels within tasks alone: the fixed-task claim. Exact up to 16 differences that are
-    not 0, else 20,000 flips drawn from `seed`.
+    With differences of task means it tests the new-task claim. With differences of paired trials
+    it permutes labels within tasks only: the fixed-task claim. Exact up to 16 differences that are
+    not 0, else with 20,000 flips drawn from `seed`.
 
     Args:
         differences: (n,), weighted so that their sum is the statistic.
@@ -130,7 +130,7 @@ def sign_flips(differences: FloatArray, seed: int = 0) -> float:
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Holm's adjusted p of several tests, in the order given (Holm 1979)."""
+    """Return Holm's adjusted p of several tests, in the order given (Holm 1979)."""
     adjusted, largest = [0.0] * len(p), 0.0
     for rank, index in enumerate(sorted(range(len(p)), key=lambda i: p[i])):
         largest = max(largest, min(1.0, (len(p) - rank) * p[index]))
@@ -139,9 +139,10 @@ def holm(p: Sequence[float]) -> list[float]:
 
 
 def pass_k(successes: FloatArray, counts: FloatArray, k: int) -> float:
-    """The chance that k trials of a task all succeed, over tasks (Yao et al. 2024, tau-bench).
+    """Return the chance that k trials of a task all succeed (Yao et al. 2024, tau-bench).
 
-    The mean of C(c, k) / C(n, k), which is unbiased; a power of the mean success is not.
+    It is the mean over tasks of C(c, k) / C(n, k), which is unbiased; a power of the mean success
+    is not.
 
     Args:
         successes: c of each task, (T,).

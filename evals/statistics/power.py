@@ -1,4 +1,4 @@
-"""How many tasks and trials it takes to see a difference as spread as a comparison shows it."""
+"""Numbers of tasks and trials that show a difference, given the spread seen in a comparison."""
 
 import math
 from bisect import bisect_left
@@ -39,12 +39,12 @@ class Spread:
 
 @dataclass(frozen=True)
 class Needed:
-    """Either of the two settles a question: more trials of these tasks, or more tasks.
+    """What settles a question, either of the two: more trials of these tasks, or more tasks.
 
     Attributes:
-        difference: that can then be seen, 0 to 1.
-        trials: per task with the tasks there are; None where no number of trials is enough.
-        tasks: with as many trials of each as now; None where none is enough.
+        difference: the one that can then be detected, 0 to 1.
+        trials: per task, with the tasks there are; None if no number of trials is enough.
+        tasks: with as many trials of each as now; None if no number of tasks is enough.
     """
 
     difference: float
@@ -53,7 +53,7 @@ class Needed:
 
 
 def spread(differences: list[FloatArray]) -> Spread:
-    """Variances as the paired differences of the trials of each task show them.
+    """Estimate the variances from the paired differences of each task's trials.
 
     Args:
         differences: one array of (n,) pairs per task, n at least 1.
@@ -70,10 +70,11 @@ def spread(differences: list[FloatArray]) -> Spread:
 
 
 def needed(seen: Spread, difference: float, *, one_sided: bool = False) -> Needed:
-    """Trials or tasks that tell a difference from 0 with power .8 at .05, as spread as was seen.
+    """Return the trials or tasks that tell a difference from 0 with power .8 at level .05.
 
     Args:
-        difference: above 0.
+        seen: the spread to expect.
+        difference: above 0, else neither number exists.
         one_sided: for a bound instead of an interval.
     """
     if difference <= 0:
@@ -94,7 +95,7 @@ def needed(seen: Spread, difference: float, *, one_sided: bool = False) -> Neede
 
 
 def _errors_needed(tasks: int, one_sided: bool) -> float:
-    """Standard errors that a difference must measure."""
+    """Return how many standard errors a difference must measure."""
     from scipy.special import stdtrit
 
     level = 1 - ALPHA / (1 if one_sided else 2)

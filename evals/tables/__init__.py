@@ -1,1 +1,1 @@
-"""The paper's tables, and one of our own: what their cells are, and what came of them here."""
+"""The paper's tables, and one of our own: their definitions, and our results for their cells."""

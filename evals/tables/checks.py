@@ -1,4 +1,4 @@
-"""Whether a run's folder may be tabled: nothing edited, dropped or repeated, no other trials."""
+"""Checks that a run's folder may be tabled: nothing edited, dropped, repeated or foreign."""
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -19,16 +19,16 @@ def checked_rows(
     methods: Collection[str],
     tasks: Collection[str],
 ) -> list[TrialRow]:
-    """The latest row of each trial in a run's folder; none where there is no run yet.
+    """Return the latest row of each trial in a run's folder; none if there is no run yet.
 
     Args:
         folder: of the run.
         suite: hash of the table's suite.
         planned: all trials of the table.
-        methods, tasks: whose rows are tabled; rows of others are let be.
+        methods, tasks: those that are tabled; rows of others need not be planned.
 
     Raises:
-        InputError: what is wrong with which row.
+        InputError: the folder or a row is not of this table, or was edited; the text says which.
     """
     if not (folder / MANIFEST).exists():
         return []
@@ -56,7 +56,7 @@ def checked_rows(
 
 
 def _unplanned(row: TrialRow, arms: Sequence[Arm]) -> str:
-    """A row that is not of the table, and why it is not."""
+    """Describe a row that does not belong to the table, and why it does not."""
     if row.arm in arms:
         return f"trial {row.trial} of task {row.task}, which is one more than are tabled"
     for arm in arms:

@@ -1,4 +1,4 @@
-"""A table as data: columns, rows, the paper's figures, and who fills a row; see tables.yaml."""
+"""Tables as data: columns, rows, the paper's figures, and what fills a row; see tables.yaml."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,24 +23,24 @@ from ..statistics.cells import cell_names
 
 _FILE = Path(__file__).with_name("tables.yaml")
 TRAINED = 5_000_000
-"""Bytes of weights under which no network was trained to see: a test's, written at random."""
+"""Least size in bytes of trained weights; smaller files are random ones, written by tests."""
 Figure = tuple[float, float | None]
-"""SR and GCR as the paper prints them; Tables II and III have no GCR."""
+"""(SR, GCR) as the paper prints them; Tables II and III have no GCR."""
 Factor = Literal["stages", "prompt"] | Part
-"""What an ablation changes: one stage for two or the other way, the prompt, or a part left out."""
+"""What an ablation changes: the number of stages (one or two), the prompt, or a part left out."""
 
 
 class Row(BaseModel, frozen=True, extra="forbid"):
     """A row of a table.
 
     Attributes:
-        row: its head.
-        method: who decides; nothing where nobody can here, and `missing` says why.
-        models: a word in the names of the models that fill it, "" for those that no other row of
-            the method takes; None where the method needs none, or has its own.
+        row: its heading.
+        method: the method that decides; empty if none can here, and `missing` says why.
+        models: a word in the names of the models that fill it; "" for the models that no other
+            row of the method takes; None if the method needs no model, or has its own.
         trials: tries of each task; the table's by default.
-        paper: its figures by column.
-        paper_tokens: the tokens it says are needed beyond those of edges, as a share.
+        paper: the paper's figures by column.
+        paper_tokens: the tokens that the paper needed beyond those of edges, as a share.
     """
 
     row: str
@@ -56,12 +56,12 @@ class Row(BaseModel, frozen=True, extra="forbid"):
 
 
 class Table(BaseModel, frozen=True, extra="forbid"):
-    """A table.
+    """The definition of a table.
 
     Attributes:
-        columns: title, and the cell (category, setup or style) that it shows.
-        factors: how rows are called that differ from one above in this alone.
-        notes: what has to be said beside it.
+        columns: the cell (category, setup or style) that each column shows, by the column's title.
+        factors: the heading of rows that differ from the one above in this factor alone.
+        notes: remarks that are printed with it.
         stand_ins: which task of the paper each of ours stands for.
     """
 
@@ -75,19 +75,19 @@ class Table(BaseModel, frozen=True, extra="forbid"):
     stand_ins: dict[str, str] = {}
 
     def within(self, column: str, trial: Trial) -> bool:
-        """Whether a trial counts in a column."""
+        """Return whether a trial counts in a column."""
         return self.columns[column] in cell_names(trial)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A row with who fills it.
+    """A row and the method that fills it.
 
     Attributes:
-        arm: None where nobody can, or has been named.
+        arm: the method; None if none can fill the row, or none has been named.
         trials: tries of each task.
-        wants: what has to be named for it, such as an option; nothing where there is an arm.
-        whole: whom an ablation is compared with: the first of them who tried the same.
+        wants: what has to be given to fill it, such as an option; empty if there is an arm.
+        whole: methods that an ablation may be compared with; the first with trials in common is.
     """
 
     row: Row
@@ -98,7 +98,7 @@ class Entry:
 
     @property
     def untrained(self) -> bool:
-        """Whether its network's weights are too few to have been trained: it says nothing."""
+        """Whether its network's weights are too small to be trained: its figures mean nothing."""
         arm = self.arm
         name = "" if arm is None else arm.model if arm.name == SEGMENT_ONLY else arm.segmenter
         folders = [Path(part) for part in name.partition(":")[2].split(",") if part]
@@ -117,10 +117,10 @@ def _tables() -> _Tables:
 
 
 def table_named(name: str) -> Table:
-    """The table of a name.
+    """Return the table of this name.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such table.
     """
     tables = _tables().tables
     if name not in tables:
@@ -129,7 +129,7 @@ def table_named(name: str) -> Table:
 
 
 def usual_tokens(method: str) -> tuple[int, int]:
-    """Tokens in and out of a trial, before any has been counted; none where no model is asked."""
+    """Return the tokens (in, out) to expect of a trial before any is counted; 0 without a model."""
     return _tables().tokens.get(method, (0, 0))
 
 
@@ -142,29 +142,29 @@ def entries(
     checkpoints: Path | None = None,
     prompts: Sequence[str] = (),
 ) -> list[Entry]:
-    """The rows of a table with who fills them: a row stands for each of its models.
+    """Return the rows of a table with the methods that fill them, one for each model of a row.
 
     Args:
         table: whose rows.
         base: what all methods share, such as where prompts are.
-        models: as Agent takes them, `simulated`, or replay:FOLDER; A+B where B plans for A.
+        models: as Agent takes them, `simulated`, or replay:FOLDER; A+B if B plans for A.
         segmenters: NAME or NAME:CHECKPOINT of the networks there are.
-        trials: tries of each task, in place of the table's own.
+        trials: tries of each task, instead of the table's own.
         checkpoints: the folder of the policies of reinforcement learning.
-        prompts: ID@VERSION, where they are a factor; else the version before the current one.
+        prompts: ID@VERSION where prompts are a factor; by default the one before the current.
 
     Raises:
-        InputError: a model or segmenter that no row takes, or that cannot be used.
+        InputError: no row takes a model, segmenter, folder or prompt, or it cannot be used.
     """
     found, taken = list[Entry](), set[str]()
     cut = {name.partition(":")[0]: name for name in segmenters} | {USUAL_SEGMENTER: USUAL_SEGMENTER}
     for row in table.rows:
         count = trials or row.trials or table.trials
         if row.method == RL:
-            found += _learnt(row, checkpoints, count)
+            found += _policy_rows(row, checkpoints, count)
             taken.add(str(checkpoints))
             continue
-        chosen = [""] if row.models is None else [m for m in models if _takes(table, row, m)]
+        chosen = [""] if row.models is None else [m for m in models if _is_for_model(table, row, m)]
         taken |= {*chosen, cut.get(row.segmenter, "")}
         wants = ""
         if row.segmenter not in cut:
@@ -180,13 +180,15 @@ def entries(
             raise InputError(f"No row of this table is for the {option} {lost[0]!r}; leave it out.")
     if prompts and "prompt" not in table.factors:
         raise InputError(f"No row of this table is for the prompt {prompts[0]!r}; leave it out.")
-    return list(_varied(table, found, prompts)) if table.factors else found
+    return list(_with_ablations(table, found, prompts)) if table.factors else found
 
 
-def _varied(table: Table, found: Sequence[Entry], prompts: Sequence[str]) -> Iterator[Entry]:
-    """The rows, each followed by those that differ from it in one factor.
+def _with_ablations(
+    table: Table, found: Sequence[Entry], prompts: Sequence[str]
+) -> Iterator[Entry]:
+    """Yield the rows, each followed by those that differ from it in one factor.
 
-    What was recorded in two stages differs from what was recorded in one.
+    A recording made in two stages is compared with those made in one.
     """
     recorded = {e.arm: recordings(e.arm.model) for e in found if e.arm is not None}
     whole = tuple(arm for arm, kept in recorded.items() if kept and not kept.staged)
@@ -195,21 +197,21 @@ def _varied(table: Table, found: Sequence[Entry], prompts: Sequence[str]) -> Ite
         if arm is None:
             yield entry
         elif (kept := recorded[arm]) and kept.staged:
-            yield _less(entry, table.factors["stages"], arm, whole)
+            yield _ablation_of(entry, table.factors["stages"], arm, whole)
         else:
             yield entry
             for factor, head in table.factors.items():
-                for other in _changed(factor, arm, prompts):
-                    yield _less(entry, head, other, (arm,))
+                for other in _ablated_methods(factor, arm, prompts):
+                    yield _ablation_of(entry, head, other, (arm,))
 
 
-def _less(entry: Entry, head: str, arm: Method, whole: tuple[Method, ...]) -> Entry:
+def _ablation_of(entry: Entry, head: str, arm: Method, whole: tuple[Method, ...]) -> Entry:
     row = entry.row.model_copy(update={"row": f"{head} {arm.prompt or ''}".strip()})
     return replace(entry, row=row, arm=arm, whole=whole)
 
 
-def _changed(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method]:
-    """Who differs from an arm in a factor, if anybody can."""
+def _ablated_methods(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method]:
+    """Return the methods that differ from an arm in this factor alone, if there can be any."""
     if factor in get_args(Part):
         return [replace(arm, without=factor)]
     if arm.name != "agent" or arm.model.startswith(REPLAY):
@@ -222,8 +224,8 @@ def _changed(factor: Factor, arm: Method, prompts: Sequence[str]) -> list[Method
     return [replace(arm, prompt=name) for name in prompts or before]
 
 
-def _takes(table: Table, row: Row, model: str) -> bool:
-    """Whether a row is for a model, by its name, of two the planner's."""
+def _is_for_model(table: Table, row: Row, model: str) -> bool:
+    """Return whether a row is for a model, judged by its name, of A+B by the planner's."""
     if model == SIMULATED or model.startswith(REPLAY):
         words = REPLAY if model.startswith(REPLAY) else ""
         return row.method == "agent" and row.models == words
@@ -235,13 +237,13 @@ def _takes(table: Table, row: Row, model: str) -> bool:
     return row.models in (named or [""])
 
 
-def _learnt(row: Row, folder: Path | None, trials: int) -> list[Entry]:
-    """The row of trained policies; unconverged ones have a row apart from the paper's figures."""
+def _policy_rows(row: Row, folder: Path | None, trials: int) -> list[Entry]:
+    """Return the row of trained policies; unconverged ones get one without the paper's figures."""
     if folder is None:
         return [Entry(row, None, trials, f"--checkpoints DIR, which {TRAIN} --out DIR writes")]
     policies = trained(folder)
     arm = check_method(Method(RL, str(folder)))
-    own = row.model_copy(update={"row": f"{row.row}: {policies.told}"})
+    own = row.model_copy(update={"row": f"{row.row}: {policies.description}"})
     if not policies.unconverged:
         return [Entry(own, arm, trials)]
     missing = f"not run: what was trained is unconverged; {TRAIN} with more --steps trains it anew"

@@ -14,9 +14,9 @@ _ESCAPES = {c: f"\\{c}" for c in "&%$#_{}"} | {"–": "--", "~": r"\textasciitil
 
 
 def parts(result: Result) -> list[str]:
-    """What came of a cell: k/n, how many there are to be where some are missing; interval; GCR.
+    """Return the texts of a cell: k/n (and the number planned if some are missing), interval, GCR.
 
-    Of an ablation also the difference to the whole, in points, and its interval.
+    For an ablation also the difference from the whole, in points, and its interval.
     """
     if result.interval is None:
         return ["–"]
@@ -30,13 +30,13 @@ def parts(result: Result) -> list[str]:
 
 
 def paper(result: Result) -> str:
-    """The paper's figure, or nothing."""
+    """Return the paper's figures, or an empty string."""
     figure = result.paper or ()
     return " / ".join(_two_digits(value) for value in figure if value is not None)
 
 
 def notes(made: Tabled) -> list[str]:
-    """What has to be said beside a table, with the stand-ins."""
+    """Return the remarks printed with a table: its notes, stand-ins, suite and cost."""
     said = [" ".join(note.split()) for note in made.table.notes]
     stand_ins = [f"{task}: {of}" for task, of in made.table.stand_ins.items()]
     said += [f"Stand-ins: {'; '.join(stand_ins)}."] if stand_ins else []
@@ -47,7 +47,7 @@ def notes(made: Tabled) -> list[str]:
 
 
 def as_matrix(made: Tabled) -> Matrix:
-    """The matrix of the report's page."""
+    """Return a table as the matrix of the report's page."""
     rows = [
         MatrixRow(row.head, row.remarks, [_matrix_cell(r) for r in row.results.values()])
         for row in made.rows
@@ -63,7 +63,7 @@ def _matrix_cell(result: Result) -> MatrixCell:
 
 
 def _two_digits(value: float) -> str:
-    """With two digits, as the paper writes it."""
+    """Format a share with two decimals and no leading zero, as the paper does."""
     return f"{value:.2f}".removeprefix("0")
 
 
@@ -82,7 +82,7 @@ def _markdown(made: Tabled) -> str:
 
 
 def _records(made: Tabled) -> list[dict[str, Any]]:
-    """One record a cell."""
+    """Return one record per cell."""
     return [
         {
             "table": made.name,
@@ -122,7 +122,7 @@ def _as_json(made: Tabled) -> str:
 
 
 def _latex(made: Tabled) -> str:
-    """A tabular of plain LaTeX, the paper's figures in a second line of each row."""
+    """Return a tabular in plain LaTeX, with the paper's figures in a second line of each row."""
     lines = [rf"\begin{{tabular}}{{l{'c' * len(made.table.columns)}}}", r"\hline"]
     lines += [_tex(["", *made.table.columns]), r"\hline"]
     for row in made.rows:
@@ -145,4 +145,4 @@ FORMATS: dict[str, tuple[str, Callable[[Tabled], str]]] = {
     "json": ("json", _as_json),
     "latex": ("tex", _latex),
 }
-"""How a table's files end, and what writes them."""
+"""File extension and writer of each format."""

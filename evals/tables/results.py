@@ -1,6 +1,6 @@
-"""What came of a table: each cell as k of n with its interval and the paper's figure beside it.
+"""Results of a table: each cell as k of n with its interval, beside the paper's figure.
 
-What was not run says so, and about what it would cost. Nothing in it depends on the time.
+Rows say which trials were not run, and about what they would cost. Nothing depends on the time.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,10 +21,10 @@ UNTRAINED = "run, but figures of weights too few to be trained are not shown"
 
 @dataclass(frozen=True)
 class Result:
-    """A cell: `passed` of `scored` trials and their mean GCR, of `planned`; the paper's figure.
+    """A cell: `passed` of `scored` of `planned` trials, their mean GCR, and the paper's figure.
 
     Attributes:
-        difference: of an ablation to the whole, over the trials that both have.
+        difference: of an ablation from the whole, over the trials that both have.
     """
 
     passed: int
@@ -36,19 +36,19 @@ class Result:
 
     @property
     def interval(self) -> Interval | None:
-        """Of the success rate at 95 %, of these tasks; None without trials."""
+        """95 % interval of the success rate on these tasks; None without trials."""
         return wilson(self.passed, self.scored) if self.scored else None
 
 
 @dataclass(frozen=True)
 class ResultRow:
-    """A row.
+    """A row of results.
 
     Attributes:
-        model: that filled it, or nothing.
+        model: the model that filled it, or an empty string.
         results: by column.
-        remarks: what is to be said beside the figures, such as why trials are missing.
-        left_usd: what these would cost; None where the price is not known.
+        remarks: notes printed beside the figures, such as why trials are missing.
+        left_usd: what the missing trials would cost; None if the price is not known.
     """
 
     head: str
@@ -61,7 +61,7 @@ class ResultRow:
 
 @dataclass(frozen=True)
 class Planned:
-    """A row with its trials; none where nobody fills it, but the number of tasks it would have."""
+    """A row with its trials, none if no method fills it, and the number of tasks it has."""
 
     entry: Entry
     trials: Sequence[Trial]
@@ -69,7 +69,7 @@ class Planned:
 
     @property
     def model(self) -> str:
-        """The model that was chosen for it, or is to be; nothing where it needs none."""
+        """The model that fills it or is to fill it; empty if it needs none."""
         arm = self.entry.arm
         if arm is None or self.entry.row.models is None:
             return ""
@@ -79,7 +79,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Tabled:
-    """A table, its suite's hash where there were trials, what came of its rows, the trials."""
+    """A table, its suite's hash (empty without trials), the results of its rows, and the trials."""
 
     name: str
     table: Table
@@ -91,14 +91,14 @@ class Tabled:
 def tabled(
     name: str, table: Table, planned: Sequence[Planned], rows: Sequence[TrialRow], tasks: int
 ) -> Tabled:
-    """The table of these rows.
+    """Return a table with the results of these rows.
 
     Args:
         name: of the table.
         table: its definition.
         planned: its rows, in order.
         rows: of the run's folder.
-        tasks: how many the suite has.
+        tasks: the number of tasks in the suite.
     """
     by_key = {row.key: row for row in rows}
     own = [[by_key[t.key] for t in plan.trials if t.key in by_key] for plan in planned]
@@ -168,13 +168,13 @@ def _result(
 
 
 def _tried_alike(whole: Sequence[TrialRow], rows: Sequence[TrialRow]) -> bool:
-    """Whether any scored trial of the ones is one of the others too."""
+    """Return whether the two have a scored trial (task and number) in common."""
     tried = {(row.task, row.trial) for row in whole if row.scored}
     return any(row.scored and (row.task, row.trial) in tried for row in rows)
 
 
 def _tokens(rows: Sequence[TrialRow]) -> tuple[int, int] | None:
-    """Of a trial in the median, in and out; None where none were counted."""
+    """Return the median tokens of a trial, (in, out); None if none were counted."""
     counted = [(row.input_tokens, row.output_tokens) for row in rows if row.input_tokens]
     if not counted:
         return None
@@ -183,14 +183,20 @@ def _tokens(rows: Sequence[TrialRow]) -> tuple[int, int] | None:
 
 
 def _missing(entry: Entry, left: int, each: tuple[int, int], cost: float | None) -> str:
-    """How much is missing, and what it would take."""
+    """Say how many trials are missing, and what it would take to run them."""
     if entry.arm is not None:
         return f"not run: {expected(left, each, cost)}"
     return f"not run: {_of_trials(left)} for want of {entry.wants}{_in_tokens(left, each)}"
 
 
 def expected(trials: int, each: tuple[int, int], cost: float | None) -> str:
-    """How many trials, and the dollars, else the tokens of each, that they are about to take."""
+    """Say how many trials there are, and about how many dollars, else tokens, they will take.
+
+    Args:
+        trials: how many.
+        each: tokens of each, (in, out).
+        cost: of all, USD; None if the price is not known.
+    """
     if cost is None:
         return f"{_of_trials(trials)}{_in_tokens(trials, each)}, at a price that is not known"
     return f"{_of_trials(trials)}; about {cost:.2f} USD" if cost else _of_trials(trials)
@@ -208,13 +214,13 @@ def _in_tokens(trials: int, each: tuple[int, int]) -> str:
 def expected_usd(
     model: str, trials: int, tokens: tuple[int, int], *, base_url: str | None = None
 ) -> float | None:
-    """What trials of a model would cost, of two the dearer; None where a price is not known.
+    """Return what trials of a model would cost, in USD; None if a price is not known.
 
     Args:
-        model: as Agent takes it, or A+B.
+        model: as Agent takes it, or A+B, of which the dearer counts.
         trials: how many.
-        tokens: of each, in and out.
-        base_url: of a server of one's own, whose prices are not known.
+        tokens: of each, (in, out).
+        base_url: of a private server, whose prices are not known.
     """
     if not any(tokens) or model == SIMULATED or model.startswith(REPLAY):
         return 0.0

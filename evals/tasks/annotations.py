@@ -26,10 +26,10 @@ DEPLOYED: tuple[Status, ...] = ("deployed",)
 
 
 def read_entries(path: Path, entries: Any = None) -> list[Entry]:
-    """The entries of a file in the photos' format, or those given as if they stood in it.
+    """Read and validate the entries of a file in the photos' format, or those given instead.
 
     Raises:
-        InputError: no such file, not JSON, against the schema, or a picture missing.
+        InputError: no such file, not JSON, it breaks the schema, or a picture is missing.
     """
     try:
         entries = json.loads(path.read_text(encoding="utf-8-sig")) if entries is None else entries
@@ -48,7 +48,7 @@ def read_entries(path: Path, entries: Any = None) -> list[Entry]:
 
 
 def _drawn_objects(entry: Entry, folder: Path) -> list[Entry]:
-    """An entry's objects with their outlines; of those that name a mask file, from there."""
+    """Return an entry's objects with their outlines, read from the mask files that they name."""
     size, picture = (entry["width"], entry["height"]), Path(entry["image"]).name
     found: list[Entry] = []
     for thing in entry["objects"]:
@@ -67,10 +67,10 @@ def _drawn_objects(entry: Entry, folder: Path) -> list[Entry]:
 
 
 def check_format(content: Any, schema: Any, what: str) -> None:
-    """Hold content to a JSON Schema.
+    """Validate content against a JSON Schema.
 
     Raises:
-        InputError: it breaks it; `what`, and the first three problems.
+        InputError: it breaks the schema; the text is `what` and the first three problems.
     """
     errors = jsonschema.Draft202012Validator(schema).iter_errors(content)
     problems = sorted(f"{error.json_path}: {error.message[:160]}" for error in errors)
@@ -82,18 +82,18 @@ def check_format(content: Any, schema: Any, what: str) -> None:
 def task_of(
     entry: Entry, task: Entry, root: Path, *, family: str, split: Split, must_pass: bool
 ) -> Task:
-    """A task of an entry.
+    """Return a task of an entry.
 
     Args:
         entry: of a picture.
         task: one of its tasks.
-        root: the folder its image is in; the current one for a drawn scene.
+        root: the folder its image is in; Path() for a drawn scene.
         family: of the picture.
-        split: that the family is in.
+        split: the one that the family is in.
         must_pass: whether it always succeeds.
 
     Raises:
-        InputError: it names a thing that is not in the picture, or a length without a scale.
+        InputError: it names a thing that is not in the picture, or metres without a scale.
     """
     expects: tuple[Status, ...] = tuple(task.get("expects", DEPLOYED))
     drawn = re.fullmatch(r"scene_([0-9]{6,})\.png", entry["image"]) if root == Path() else None
@@ -141,7 +141,7 @@ def _goal_of(entry: Entry, task: str, goal: Entry) -> Goal:
 
 
 def _rule_in_pixels(rule: Entry, task: str, scale: float | None) -> Entry:
-    """A success rule with its lengths in px, `band_px` for `band_m`, which is what is graded."""
+    """Return a success rule with all lengths in px (`band_px` for `band_m`), as graders need it."""
     made: Entry = {}
     for name, value in rule.items():
         if not name.endswith("_m"):

@@ -1,6 +1,6 @@
-"""Reads dialogues of a suite: a picture, things that are pointed at, and what is said turn by turn.
+"""Reader of dialogues in suites: a picture, things pointed at, and what is said turn by turn.
 
-What must come of a turn stands beside its words: a kind (see grading/dialogue.py) and checks by
+Each turn has its expected result beside its words: a kind (see grading/dialogue.py) and checks by
 name (see grading/dialogue_checks.py).
 """
 
@@ -18,14 +18,14 @@ from ..scenes.stories import entry_of, story_of
 from .annotations import ANNOTATIONS, PHOTOS, SCALE, Entry, read_entries
 from .task import Dialogue, Drawing, Split, Task, Thing, Turn
 
-SAID = ("say", "expect", "point", BACK)
+TURN_KEYS = ("say", "expect", "point", BACK)
 
 
 def dialogues_in(item: Entry, path: Path) -> list[Entry]:
-    """The dialogues that an item of a suite lists, or names a file of.
+    """Return the dialogues that an item of a suite lists, or those of the file that it names.
 
     Raises:
-        InputError: the file cannot be read, or is no list.
+        InputError: the file cannot be read, or holds no list.
     """
     given: list[Entry] | str = item["dialogues"]
     if isinstance(given, list):
@@ -42,10 +42,10 @@ def dialogues_in(item: Entry, path: Path) -> list[Entry]:
 
 
 def dialogue_task(given: Entry, category: str, split: Split) -> Task:
-    """A dialogue as a task.
+    """Return a dialogue as a task.
 
     Raises:
-        InputError: it names a picture, a thing, an expectation or a check that there is not.
+        InputError: it names a picture, a thing, an expectation or a check that does not exist.
     """
     name = given["id"]
     photo = "photo" in given
@@ -74,8 +74,8 @@ def dialogue_task(given: Entry, category: str, split: Split) -> Task:
 
 
 def _turn(name: str, entry: Entry, given: Entry, things: list[Thing]) -> Turn:
-    """A turn; a thing that it points at is added to those there are."""
-    checks: dict[str, Any] = {key: value for key, value in given.items() if key not in SAID}
+    """Return a turn; a thing that it points at is added to `things` if it is new."""
+    checks: dict[str, Any] = {key: value for key, value in given.items() if key not in TURN_KEYS}
     unknown = sorted(checks.keys() - CHECKS.keys())
     if unknown or given["expect"] not in STATUSES:
         what = unknown[0] if unknown else given["expect"]

@@ -1,6 +1,6 @@
-"""Whether annotations are of their picture, in its frame: px as it is shown, x right, y down.
+"""Check that annotations fit their picture, in its frame: px as it is shown, x right, y down.
 
-Outlines of another frame are refused with the frame that fits.
+Outlines in another frame are refused, and the error names the frame that would fit.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from ...tools.perception.imports.frames import BETTER, is_seen, likeliest_frame
 
 
 def check_frame(entry: dict[str, Any], folder: Path) -> None:
-    """Hold an entry of annotations against its picture.
+    """Check an entry of annotations against its picture.
 
     Raises:
         InputError: another picture or size, an outline that crosses itself, or another frame.

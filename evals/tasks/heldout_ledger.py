@@ -1,6 +1,6 @@
-"""The ledger of looks at held-out tasks: each is written down before it is taken.
+"""The ledger of looks at held-out tasks: each look is recorded before it is taken.
 
-Whoever looks often enough fits what is held out; the ledger says how often that was.
+Looking often enough means fitting the held-out tasks; the ledger says how often it was done.
 """
 
 import json
@@ -14,13 +14,13 @@ NAME = "heldout-ledger.jsonl"
 
 
 def look(folder: Path, suite: str, sha256: str, arms: Sequence[str]) -> int:
-    """Write a look down; how many there have been of this suite, this one included.
+    """Record a look; return how many there have been at this split, this one included.
 
     Args:
         folder: of the ledger; the one that holds the folders of runs.
         suite: its name.
         sha256: of the split.
-        arms: what looks.
+        arms: names of the arms that are tried on it.
 
     Raises:
         InputError: it cannot be written or read.

@@ -1,6 +1,6 @@
-"""What a prompt gives away of the tasks it is judged by: their words, or places in their pictures.
+"""Leaks of evaluation tasks into prompts: words of a task, or places in its picture.
 
-A prompt that holds them is graded on what it was told. Optimisers copy them in by themselves
+A prompt that contains them is graded on what it was told. Optimisers copy them in by themselves
 (gepa-ai/gepa, issue 261).
 """
 
@@ -16,12 +16,12 @@ from .suites import load_suite
 from .task import Task
 
 WORDS = 5
-"""As many words in a row that stand in a task are no chance."""
+"""So many words in a row that also occur in a task are no coincidence."""
 _PAIR = re.compile(r"[\[(]?\b([0-9]+(?:\.[0-9]+)?)\s*,\s*([0-9]+(?:\.[0-9]+)?)\b")
 
 
 def leaks(prompt: Prompt) -> list[Finding]:
-    """Words and coordinates of the shipped suites that stand in a prompt or its examples."""
+    """Return findings on words and places of shipped suites in a prompt, examples or defaults."""
     given = prompt.front.inputs.values()
     text = "\n".join([prompt.text, *(str(v) for i in given for v in (i.example, i.default) if v)])
     texts, places = _known_content()
@@ -35,7 +35,7 @@ def leaks(prompt: Prompt) -> list[Finding]:
 
 @cache
 def _known_content() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[float, float]]]:
-    """Runs of words, and places (x, y) in px, of the tasks that ship with formup."""
+    """Return runs of words, and places (x, y) px, of the tasks that ship with formup."""
     tasks = [task for name in ("photos", "many") for task in load_suite(name).tasks]
     parts = [part for words in wordings() for part in words.values()]
     templates = chain.from_iterable(some for part in parts for some in part.values())
@@ -45,13 +45,13 @@ def _known_content() -> tuple[frozenset[tuple[str, ...]], frozenset[tuple[float,
 
 
 def _word_runs(text: str) -> set[tuple[str, ...]]:
-    """All five words in a row of a text; a slot such as {thing} is a word of its own."""
+    """Return all runs of five words in a text; a slot such as {thing} counts as a word."""
     words = re.findall(r"\{?\w+\}?", text.lower())
     return {tuple(words[i : i + WORDS]) for i in range(len(words) - WORDS + 1)}
 
 
 def _places(task: Task) -> Iterable[tuple[float, float]]:
-    """Where robots should stand, and the outline of what is meant and of its box."""
+    """Yield where robots should stand, and the corners of the outlines and boxes of the things."""
     for point in (point for goal in task.goals for point in goal.success.get("points", ())):
         yield float(point[0]), float(point[1])
     for thing in task.things:

@@ -1,4 +1,4 @@
-"""The pictures of a suite as files, drawn where they are not there yet, and what they hash to."""
+"""The pictures of a suite as files, drawn if they do not exist yet, with their hashes."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -20,11 +20,11 @@ class RenderedPicture:
 def render(
     tasks: Sequence[Task], folder: Path, done: Callable[[], None] = lambda: None
 ) -> dict[str, RenderedPicture]:
-    """The picture of each task, by its id.
+    """Return the picture of each task by its id; those that do not exist yet are drawn.
 
     Args:
         tasks: whose pictures are wanted.
-        folder: for those that are drawn; what is there already is used, and hashed as it is.
+        folder: for drawn pictures; a file that exists is used, and hashed as it is.
         done: called after each.
 
     Raises:
@@ -42,13 +42,13 @@ def render(
                 part = path.with_suffix(".part")
                 task.picture.image().save(part, format="PNG", compress_level=1)
                 part.replace(path)
-            found[path] = RenderedPicture(path, hashed(load_picture(path)))
+            found[path] = RenderedPicture(path, pixel_hash(load_picture(path)))
         rendered[task.id] = found[path]
         done()
     return rendered
 
 
-def hashed(picture: Picture) -> str:
-    """SHA-256 of a picture's size and pixels, however its file holds them."""
+def pixel_hash(picture: Picture) -> str:
+    """Return the SHA-256 of a picture's size and pixels, whatever the file's format."""
     pixels = picture.pixels
     return hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes()).hexdigest()

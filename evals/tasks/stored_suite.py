@@ -1,4 +1,4 @@
-"""The suite in a run's folder, so that the run can be looked at without where it came from.
+"""The copy of a suite in a run's folder, so that the run can be viewed without the original.
 
 Of held-out tasks only the chance level is stored: nothing of what they ask, show or expect.
 """
@@ -19,11 +19,11 @@ from .rendered_pictures import RenderedPicture
 from .task import Suite, Task
 
 NAME, PICTURES, ATTEMPTS = "suite.json", "pictures", "attempts"
-"""In a run's folder: its suite, the pictures drawn for it, what came of each trial."""
+"""In a run's folder: its suite, the pictures drawn for it, the results of its trials."""
 
 
 class StoredSuite(BaseModel):
-    """A suite's split; the held-out one holds no tasks.
+    """A stored split of a suite; the held-out one has no tasks.
 
     Attributes:
         chance: what the best policy without understanding scores, by cell.
@@ -42,7 +42,7 @@ class StoredSuite(BaseModel):
 
     @property
     def held_out(self) -> bool:
-        """Whether scores are all that may be seen."""
+        """Whether nothing but scores may be shown."""
         return self.split == "test"
 
 
@@ -54,15 +54,15 @@ def store_suite(
     pictures: Mapping[str, RenderedPicture],
     levels: Mapping[str, Chance],
 ) -> None:
-    """Write down the suite of a run; a folder of another suite, which is refused, is left alone.
+    """Store the suite of a run; a folder of another suite, which the run refuses, is left alone.
 
     Args:
         folder: of the run.
-        suite: what is run of it.
-        split: that it is.
+        suite: with the tasks that are run.
+        split: the name of the split that is run.
         sha256: by which results name it.
         pictures: the picture of each task, by its id.
-        levels: of chance, by name of cell.
+        levels: chance levels by name of cell.
 
     Raises:
         InputError: it cannot be written.
@@ -83,7 +83,7 @@ def store_suite(
 
 
 def read_suite(folder: Path) -> StoredSuite:
-    """The stored suite of a run.
+    """Return the stored suite of a run.
 
     Raises:
         InputError: there is none, it is damaged, or it is not that of the run's trials.
@@ -104,7 +104,7 @@ def read_suite(folder: Path) -> StoredSuite:
 
 
 def join_stored(folders: Sequence[Path], into: Path) -> None:
-    """Put what runs store beside their rows together, as far as they store anything.
+    """Copy what runs store beside their rows into one folder, as far as they store anything.
 
     Raises:
         InputError: it cannot be copied.
@@ -121,7 +121,7 @@ def join_stored(folders: Sequence[Path], into: Path) -> None:
 
 
 def _seen_from(folder: Path, picture: RenderedPicture) -> RenderedPicture:
-    """Inside the folder as it is, which may be moved; else where it lies."""
+    """Return it with a path relative to the folder, which may be moved, or absolute if outside."""
     path = picture.path
     inside = path.is_relative_to(folder)
     return RenderedPicture(path.relative_to(folder) if inside else path.resolve(), picture.pixels)

@@ -1,6 +1,6 @@
-"""Reads suites: YAML files that give tasks in full, name photographs, or name drawn scenes by seed.
+"""Reader of suites: YAML files with tasks in full, names of photographs, or seeds of scenes.
 
-A folder of pictures with an annotations.json is a suite too, with a suite.yaml beside it or not.
+A folder of pictures with an annotations.json is a suite too, with or without a suite.yaml.
 """
 
 import json
@@ -26,7 +26,7 @@ from .recipes.unmet import unmet
 from .task import SPLITS, Split, Suite, Task
 
 FILE = "suite.yaml"
-"""In a folder of somebody's own."""
+"""Name of the suite's file in a folder of the user's own."""
 HERE = Path(__file__).parent
 RECIPES: dict[str, Callable[[int, float | None], Entry]] = {
     "own": lambda seed, scale: entry_of(story_of(seed)),
@@ -36,11 +36,11 @@ RECIPES: dict[str, Callable[[int, float | None], Entry]] = {
     "unmet": lambda seed, scale: unmet(seed),
     "inscribed": lambda seed, scale: inscribed(seed),
 }
-"""Makes the entry of a seed; lengths are named in metres where there are metres per pixel."""
+"""Functions (seed, metres per pixel) that make an entry; a scale has lengths named in metres."""
 
 
 def shipped() -> list[str]:
-    """Names of the suites that ship with formup, sorted."""
+    """Return the names of the suites that ship with formup, sorted."""
     return sorted(path.stem for path in HERE.glob("*.yaml"))
 
 
@@ -49,12 +49,12 @@ def load_suite(name: str, split: str | None = None, seeds: str | None = None) ->
 
     Args:
         name: of a shipped suite, or the path of a YAML file, of a folder with a suite.yaml or an
-            annotations.json, or of a file like the latter by another name.
-        split: only its tasks; None for all.
-        seeds: a range A-B, or A, in place of the seeds of a suite of drawn scenes.
+            annotations.json, or of a file in that format with another name.
+        split: the only one whose tasks are read; None for all.
+        seeds: a range A-B, or A, instead of the seeds of a suite of drawn scenes.
 
     Raises:
-        InputError: there is none, it is against the schema, or it has no such split or seeds.
+        InputError: there is none, it breaks the schema, or it has no such split or seeds.
     """
     if split is not None and split not in SPLITS:
         raise InputError(f"Unknown split {split!r}. There are: {', '.join(SPLITS)}.")
@@ -78,17 +78,17 @@ def load_suite(name: str, split: str | None = None, seeds: str | None = None) ->
 
 
 def description(name: str) -> str:
-    """What a shipped suite is, in its own words."""
+    """Return a shipped suite's own description."""
     content = yaml.safe_load((HERE / f"{name}.yaml").read_text(encoding="utf-8"))
     return " ".join(content["description"].split())
 
 
 def write_suite(folder: Path, name: str) -> Path:
-    """Make a suite of a folder in the photos' format; the path of its YAML file.
+    """Make a suite of a folder in the photos' format; return the path of its YAML file.
 
     Raises:
-        InputError: it has one already, or there is no annotations.json that can be read, or
-            none of these pictures.
+        InputError: it has one already, its annotations.json cannot be read, or annotations do not
+            fit their pictures.
     """
     path = folder / FILE
     for entry in read_entries(folder / ANNOTATIONS):
@@ -101,11 +101,11 @@ def write_suite(folder: Path, name: str) -> Path:
 
 
 def annotated(path: Path, name: str = "") -> Entry:
-    """The suite that a file in the photos' format is by itself.
+    """Return the content of the suite that a file in the photos' format is by itself.
 
     Args:
         path: of the file.
-        name: of the suite; that of the folder, or of the file if it is no annotations.json.
+        name: of the suite; by default the folder's, or the file's if not annotations.json.
     """
     place = path.resolve()
     own = place.parent.name if path.name == ANNOTATIONS else place.stem
@@ -119,15 +119,15 @@ def annotated(path: Path, name: str = "") -> Entry:
 
 
 def schema() -> Entry:
-    """The JSON Schema of suites."""
+    """Return the JSON Schema of suites."""
     return json.loads((HERE / "schema.json").read_text(encoding="utf-8"))
 
 
 def seeds_of(value: str | list[int], path: Path) -> list[int]:
-    """Seeds as listed, or as a range A-B.
+    """Return seeds as listed, or those of a range A-B.
 
     Raises:
-        InputError: no such range.
+        InputError: it is no such range.
     """
     if isinstance(value, list):
         return value
@@ -160,7 +160,7 @@ def _read_yaml(path: Path, name: str) -> Any:
 
 
 def _split_of(family: str, splits: dict[str, list[str]], path: Path) -> Split:
-    """The split of a family; dev where a suite has none."""
+    """Return the split of a family; dev if the suite has no splits."""
     found: list[Split] = [s for s in SPLITS if family in splits.get(s, ())]
     if splits and len(found) != 1:
         raise InputError(
@@ -173,7 +173,7 @@ def _split_of(family: str, splits: dict[str, list[str]], path: Path) -> Split:
 def _tasks_of_item(
     item: Entry, path: Path, splits: dict[str, list[str]], wanted: str | None
 ) -> Iterator[Task]:
-    """The tasks of one item of a suite's list that are in the split wanted, if one is."""
+    """Yield the tasks of one item of a suite's list; only those in the wanted split, if given."""
     if "dialogues" in item:
         yield from _dialogues(item, path, splits, wanted)
         return
@@ -193,7 +193,7 @@ def _tasks_of_item(
 def _dialogues(
     item: Entry, path: Path, splits: dict[str, list[str]], wanted: str | None
 ) -> Iterator[Task]:
-    """The dialogues of an item, listed there or in a file of their own."""
+    """Yield the dialogues of an item as tasks, listed there or in a file of their own."""
     listed = dialogues_in(item, path)
     form = {"type": "array", "items": {"$ref": "#/$defs/dialogue"}, "$defs": schema()["$defs"]}
     check_format(listed, form, f"{path} breaks the format of dialogues")
@@ -205,7 +205,7 @@ def _dialogues(
 
 
 def _entries(item: Entry, path: Path) -> Iterator[tuple[Callable[[], Entry], str, Path]]:
-    """What makes each entry in the photos' format, its family, the folder its image is in."""
+    """Yield for each entry a function that makes it, its family, and the folder of its image."""
     if "scenes" in item:
         recipe = RECIPES[item.get("recipe", "own")]
         for seed in seeds_of(item["scenes"], path):

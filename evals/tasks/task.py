@@ -1,4 +1,4 @@
-"""A task and a suite of tasks, as values; and the hash by which results name a suite."""
+"""Tasks and suites of tasks as values, and the hash by which results name a suite."""
 
 import hashlib
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ Ring = list[list[float]]
 
 @dataclass(frozen=True)
 class Thing:
-    """An annotated object: its name and outline, pixels of the stored image."""
+    """An annotated object: its name, and its outline in pixels of the stored image."""
 
     id: str
     name: str
@@ -40,23 +40,23 @@ class Thing:
 
     @cached_property
     def region(self) -> Polygon:
-        """What it covers, without its holes."""
+        """The region it covers, without its holes."""
         return Polygon(self.polygon, self.holes)
 
     def overlap(self, found: Polygon) -> float:
-        """Intersection over union of an outline that was found with the true one."""
+        """Return the intersection over union of a found outline with the true one."""
         truth = shapely.make_valid(self.region)
         return float(found.intersection(truth).area / max(found.union(truth).area, 1e-9))
 
 
 @dataclass(frozen=True)
 class Goal:
-    """So many robots about a thing, and the rule that says when they stand right.
+    """A number of robots to place about a thing, and the rule for when they stand right.
 
     Attributes:
         size: of the picture, (width, height), px.
         success: the rule; lengths in px.
-        other: a second thing, where robots stand between two.
+        other: a second thing, if robots stand between two.
     """
 
     robots: int
@@ -73,13 +73,13 @@ class Goal:
 
 @dataclass(frozen=True)
 class Turn:
-    """What a person says in a dialogue, and what must come of it.
+    """What a person says in one turn of a dialogue, and the result it must have.
 
     Attributes:
-        words: as they are typed.
-        expect: kind of what is right, such as edit or ask; see grading/dialogue.py.
+        words: as typed.
+        expect: the kind of result that is right, such as edit or ask; see grading/dialogue.py.
         checks: what must have changed and what must not, by name; see grading/dialogue_checks.py.
-        point: where the person points meanwhile, (x, y) px.
+        point: where the person points meanwhile, (x, y) px, if anywhere.
     """
 
     words: str
@@ -93,8 +93,8 @@ class Dialogue:
     """Several turns about things that the person points at.
 
     Attributes:
-        things: pointed at, t1 first.
-        given: how many of them from the start; the others in later turns.
+        things: those pointed at, t1 first.
+        given: how many of them are pointed at from the start; the others are in later turns.
         size: of the picture, (width, height), px.
     """
 
@@ -106,18 +106,18 @@ class Dialogue:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture that is drawn: the scene of a seed, perhaps with words in it."""
+    """A picture that is drawn by code: the scene of a seed, perhaps with words in it."""
 
     seed: int
     inscription: str = ""
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return f"scene_{self.seed:06d}{'_inscribed' if self.inscription else ''}.png"
 
     def image(self) -> Image.Image:
-        """The picture; always the same pixels."""
+        """Draw the picture; the pixels are always the same."""
         story = story_of(self.seed)
         drawn = draw(story.scene)
         return inscribe(drawn, story, self.inscription) if self.inscription else drawn
@@ -129,16 +129,16 @@ class Task:
 
     Attributes:
         id: unique in its suite.
-        robots: as the person gives them; None leaves it to the words.
+        robots: the number that the person sets; None leaves it to the words.
         family: of the picture; splits are by family, so that no scene is in two of them.
         style: how it is worded, or what is wrong with it.
-        referring: by which kind of reference a drawn scene tells the thing.
-        goals: all of them are to be reached; none where nothing is to be placed.
+        referring: the kind of reference that tells which thing is meant in a drawn scene.
+        goals: all must be reached; none if nothing is to be placed.
         expects: statuses that are right.
-        picture: a file, or one that is drawn.
+        picture: a file, or one that is drawn by code.
         must_pass: it always succeeds; the gate holds new versions to it.
-        metres_per_pixel: of the picture, given to the method; None where it has no scale.
-        dialogue: what is said and graded turn by turn; None for one instruction.
+        metres_per_pixel: of the picture, given to the method; None if it has no scale.
+        dialogue: turns that are said and graded one by one; None for a single instruction.
     """
 
     id: str
@@ -166,7 +166,7 @@ class Task:
 
     @property
     def content(self) -> dict[str, Any]:
-        """All that a result depends on but the picture's pixels."""
+        """All that a result depends on except the picture's pixels."""
         return {
             "id": self.id,
             "instruction": self.instruction,
@@ -193,14 +193,14 @@ def _goal_content(goal: Goal) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Suite:
-    """Tasks under a name."""
+    """A named set of tasks."""
 
     name: str
     description: str
     tasks: tuple[Task, ...]
 
     def sha256(self, pixels: Mapping[str, str]) -> str:
-        """The hash of its tasks with their pictures, by which results name it.
+        """Return the hash of its tasks with their pictures, by which results name it.
 
         Args:
             pixels: hash of the picture of each task, by the task's id.

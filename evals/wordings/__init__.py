@@ -1,1 +1,1 @@
-"""Instructions in the words of many people, and the model that is trained on them."""
+"""Instructions worded by many people, and the model that is trained on them."""

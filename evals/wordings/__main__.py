@@ -13,7 +13,7 @@ NAMES = ("right", "asked", "wrong", "rightly asked")
 
 
 def main() -> None:
-    """Print verdicts by author, each read without having been trained on; write the weights."""
+    """Print verdicts by author, each unseen in training; write the weights trained on all."""
     sentences = shipped_sentences()
     folds = list(by_author(sentences))
     print(f"{'author':12}{'sentences':>10}" + "".join(f"{name:>15}" for name in NAMES))  # noqa: T201

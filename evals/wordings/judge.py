@@ -1,4 +1,4 @@
-"""How well instructions of one author are read by a model that was trained on the others'."""
+"""Evaluation of how well a model reads instructions of an author it was not trained on."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -15,12 +15,12 @@ from .sentences import Sentence
 from .train import known_words, train
 
 SCALE = 0.05
-"""Metres per pixel of the picture that the sentences are read for."""
+"""Metres per pixel of the picture for which sentences are read."""
 TEMPERATURES = np.geomspace(0.5, 4, 25)
 
 
 def by_author(sentences: Sequence[Sentence]) -> Iterator[tuple[str, LinearModel, list[Sentence]]]:
-    """Each author with the model trained on all others, and the author's sentences."""
+    """Yield each author with the model trained on all others, and the author's sentences."""
     for author in sorted({s.author for s in sentences}):
         others = [s for s in sentences if s.author != author]
         own = [s for s in sentences if s.author == author]
@@ -28,9 +28,9 @@ def by_author(sentences: Sequence[Sentence]) -> Iterator[tuple[str, LinearModel,
 
 
 def verdicts(model: LinearModel, sentences: Sequence[Sentence]) -> Counter[str]:
-    """How many sentences are read right, wrong, asked about, and rightly asked about.
+    """Count the sentences that are read right, wrong, asked about, and rightly asked about.
 
-    The thing is pointed at. Right is the arrangement and the number that the author meant.
+    The thing is pointed at. Right means the arrangement and the number that the author meant.
     """
     with lent(model):
         return Counter(_verdict(s) for s in sentences)
@@ -56,7 +56,7 @@ def _fits(reading: Reading, meaning: str) -> bool:
 
 
 def temperature(folds: Sequence[tuple[LinearModel, Sequence[Sentence]]]) -> float:
-    """The temperature with the least loss on authors that the models were not trained on."""
+    """Return the temperature with the least loss on authors the models were not trained on."""
     losses = [
         -float(np.mean([np.log(_probability(replace(m, temperature=t), s)) for m, own in folds
                         for s in own]))

@@ -1,4 +1,4 @@
-"""Sentences of many authors, marked by hand: what in them is thing, demand and background."""
+"""Sentences of many authors, marked by hand: which words are thing, demand and background."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,11 +14,12 @@ class Sentence:
     """An instruction and what its author marked.
 
     Attributes:
-        author: whose file it stands in.
+        author: the one in whose file it is.
         text: the instruction.
-        words: its tokens; labels: what each is there for, as tagging.LABELS has it.
+        words: its tokens.
+        labels: what each token is there for, of tagging.LABELS.
         meaning: one of tagging.MEANINGS.
-        robots: how many in all; None where it does not say.
+        robots: how many in all; None if it does not say.
     """
 
     author: str
@@ -30,17 +31,17 @@ class Sentence:
 
 
 def shipped_sentences() -> tuple[Sentence, ...]:
-    """All sentences of this folder's authors."""
+    """Return all sentences of this folder's authors."""
     folder = resources.files(__package__ or "").joinpath("authors")
     files = sorted((f for f in folder.iterdir() if f.name.endswith(".jsonl")), key=lambda f: f.name)
     return tuple(s for f in files for s in read_sentences(f.name[:-6], f.read_text("utf-8")))
 
 
 def read_sentences(author: str, lines: str) -> Iterator[Sentence]:
-    """The sentences of one author's JSON lines.
+    """Yield the sentences of one author's JSON lines.
 
     Raises:
-        InputError: a line is no such sentence.
+        InputError: a line has an unknown relation, or marks a phrase that is not in its text.
     """
     for number, line in enumerate(lines.splitlines(), 1):
         if not line.strip():

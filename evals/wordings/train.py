@@ -1,4 +1,4 @@
-"""Train the model that reads instructions, and judge it leaving one author out at a time."""
+"""Training of the model that reads instructions: its tags, its meanings, and its known words."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -27,19 +27,19 @@ PENALTY_TAGS, PENALTY_MEANINGS = 0.5, 0.3
 """Ridge penalties, chosen by leaving one author out."""
 STEPS = 60
 GENERAL = 5
-"""Meanings, of ten, from which on a word is taken to go with any."""
+"""A word with at least so many meanings, of ten, is taken to go with any."""
 Floats = NDArray[np.float64]
 
 
 def train(sentences: Sequence[Sentence]) -> LinearModel:
-    """The model that fits the sentences best."""
+    """Return the model that fits the sentences best."""
     emission, transition = _train_tags(sentences)
     command = _train_meanings(sentences)
     return LinearModel(emission, transition, command)
 
 
 def _feature_rows(features: Sequence[Sequence[int]], buckets: int) -> csr_matrix:
-    """(N, buckets) counts of features."""
+    """Return counts of features, (N, buckets)."""
     ends = np.cumsum([0, *(len(f) for f in features)])
     columns = np.concatenate([np.asarray(f) for f in features])
     return csr_matrix((np.ones(len(columns)), columns, ends), shape=(len(features), buckets))
@@ -63,7 +63,7 @@ def _train_meanings(sentences: Sequence[Sentence]) -> Floats:
 
 
 def _train_tags(sentences: Sequence[Sentence]) -> tuple[Floats, Floats]:
-    """Emission and transition weights of the conditional random field."""
+    """Return the emission and transition weights of the conditional random field."""
     lines = [[w.text for w in s.words] for s in sentences]
     rows = _feature_rows([row for line in lines for row in tag_features(line)], TAG_BUCKETS)
     lengths = np.array([len(line) for line in lines])
@@ -95,7 +95,7 @@ def _train_tags(sentences: Sequence[Sentence]) -> tuple[Floats, Floats]:
 def _expectations(
     scores: Floats, lengths: NDArray[np.intp], transition: Floats
 ) -> tuple[float, Floats, Floats]:
-    """The log partition sum of all lines, label marginals (N, L), and expected pairs (L, L)."""
+    """Return the log partition sum of all lines, label marginals (N, L), expected pairs (L, L)."""
     longest, states = int(lengths.max()), scores.shape[1]
     inside = np.arange(longest)[None, :] < lengths[:, None]
     padded = np.zeros((len(lengths), longest, states))
@@ -123,9 +123,9 @@ def _minimum(loss: Callable[[Floats], tuple[float, Floats]], size: int) -> Float
 
 
 def known_words(sentences: Sequence[Sentence]) -> dict[str, frozenset[str]]:
-    """Stems of words of commands, each with what it stood for in two sentences or more.
+    """Return stems of words in commands, each with the meanings it had in two sentences or more.
 
-    A word that stood in commands of many meanings says nothing of them and goes with all.
+    A word that occurred in commands of many meanings says nothing about them and goes with all.
     """
     counted: dict[str, Counter[str]] = {}
     for s in sentences:
@@ -143,7 +143,7 @@ def known_words(sentences: Sequence[Sentence]) -> dict[str, frozenset[str]]:
 
 
 def store(path: Path, model: LinearModel) -> None:
-    """Write a model, its weights rounded to 127 steps each way."""
+    """Write a model, with its weights rounded to 127 steps each way."""
     words = [" ".join([word, *sorted(meanings)]) for word, meanings in sorted(model.words.items())]
     arrays: dict[str, Any] = {"temperature": model.temperature, "words": np.array(words)}
     for name in ("emission", "transition", "command"):

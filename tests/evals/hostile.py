@@ -12,7 +12,7 @@ from formup.evals.experiments.seals import sealed_all
 from formup.evals.experiments.suite_work import attempt_name
 from formup.evals.experiments.trials import Arm, Status, Trial, TrialRow
 from formup.evals.statistics.cells import Chance
-from formup.evals.tasks.rendered_pictures import RenderedPicture, hashed
+from formup.evals.tasks.rendered_pictures import RenderedPicture, pixel_hash
 from formup.evals.tasks.stored_suite import StoredSuite
 from formup.evals.tasks.task import Goal, Task, Thing
 from formup.tools.perception.image import load_picture
@@ -37,7 +37,7 @@ def write_run(folder: Path, method: str, *, passing: int, split: str = "dev") ->
     pixels[40:80, 60:100] = (200, 40, 40)
     Image.fromarray(pixels).save(folder / "square.png")
     rows = [_row(i, n, method, i < passing) for i in range(TASKS) for n in range(2)]
-    pixels_hash = hashed(load_picture(folder / "square.png"))
+    pixels_hash = pixel_hash(load_picture(folder / "square.png"))
     picture = RenderedPicture(Path("square.png"), pixels_hash)
     suite = StoredSuite(
         name="hostile",

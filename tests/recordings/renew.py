@@ -17,7 +17,7 @@ from formup.agent.store.folder import read_events
 from formup.agent.store.protocol import Event
 from formup.evals.experiments.dialogue_work import hold
 from formup.evals.experiments.pointing import pointing
-from formup.evals.experiments.recordings import PLAN, Spoken
+from formup.evals.experiments.recordings import PLAN, RecordedReplies
 from formup.evals.tasks.suites import load_suite
 from formup.tools.context import Settings
 from formup.tools.perception.image import load_picture
@@ -34,9 +34,16 @@ def renewed(path: Path, written: Path) -> tuple[Event, ...]:
     picture = load_picture(image if isinstance(image, Path) else DRAWN / f"{path.stem}.png")
     settings = Settings.model_validate(turn["settings"])
     if task is not None and task.dialogue is not None:
-        hold(Agent(Spoken(path)), picture, task, settings, pointing(task, "words", 0), written)
+        hold(
+            Agent(RecordedReplies(path)),
+            picture,
+            task,
+            settings,
+            pointing(task, "words", 0),
+            written,
+        )
     else:
-        Agent(Spoken(path)).run(picture, turn["words"], settings=settings, trace=written)
+        Agent(RecordedReplies(path)).run(picture, turn["words"], settings=settings, trace=written)
     return read_events(written)
 
 

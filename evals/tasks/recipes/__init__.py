@@ -1,1 +1,1 @@
-"""What is asked of drawn scenes beyond their own task: each recipe makes an entry from a seed."""
+"""Recipes for further tasks on drawn scenes: each one makes an entry from a seed."""

@@ -1,7 +1,7 @@
-"""Escape-proof cages of few robots: fewer than the ring that a disc in the thing certifies.
+"""Tasks for escape-proof cages of few robots: fewer than a ring certified by an inscribed disc.
 
-A ring that closes every gap below the thing's inscribed disc certainly holds it, and anybody who
-counts well makes one. With fewer robots it depends on the shape where they have to stand.
+A ring whose gaps are all narrower than the thing's inscribed disc certainly holds it, and takes
+no more than counting. With fewer robots, where they have to stand depends on the shape.
 """
 
 import math
@@ -15,10 +15,10 @@ from ...scenes.things import Thing
 from .length_rules import distance
 
 SHARES = (0.6, 1.0)
-"""Of the robots of such a ring."""
+"""Robots asked for, as shares of those in such a ring."""
 LEAST, MOST = 4, 30
 OFF_SHARE, OFF = 0.4, 4.0
-"""How far off the distance a robot may stand: this share of it, at least so many px."""
+"""How far off the distance a robot may stand: this share of it, but at least so many px."""
 WORDS = (
     "cage {thing} with {n} robots, about {d} px from it, escape-proof: it must not get out however "
     "it moves and turns",
@@ -27,7 +27,7 @@ WORDS = (
 
 
 def caged(seed: int) -> dict[str, Any]:
-    """The entry of annotations.json of a seed."""
+    """Return the entry of annotations.json of a seed."""
     story = story_of(seed)
     random = np.random.default_rng([seed, 8])
     thing = story.target

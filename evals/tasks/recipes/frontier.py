@@ -1,7 +1,7 @@
-"""What a vision model alone does not solve: 20 to 100 robots at exact distances, several groups.
+"""Tasks a vision model alone does not solve: 20 to 100 robots at exact distances, several groups.
 
-The turn of a seed says what is asked: a ring, an infill, groups, a cage. Distances hold to 3 px,
-about what a careful outline is off.
+The scene of a seed decides what is asked: a ring, an infill, groups or a cage. Distances must
+hold to 3 px, about the error of a careful outline.
 """
 
 import math
@@ -20,18 +20,18 @@ from .metric import SPREAD, Named, named_length, robot_size
 ROBOTS, SIZED_ROBOTS = (20, 100), (20, 48)
 OFF = 3.0
 APART, BODIES = 0.5, 2.1
-"""Least distance of robots inside: a share of a robot's cell, and so many of its radius."""
+"""Least distance between robots inside: this share of a robot's cell, and so many of its radii."""
 SHARED = (8, 30)
-"""Robots of one group where there are several."""
+"""Robots of one group if there are several."""
 TURNS = ("ring", "infill", "groups", "cage")
 
 
 def frontier(seed: int, scale: float | None = None) -> dict[str, Any]:
-    """The entry of annotations.json of a seed.
+    """Return the entry of annotations.json of a seed.
 
     Args:
         seed: of the scene.
-        scale: metres per pixel: lengths are named in metres, and the robots' size too.
+        scale: metres per pixel; with it lengths are named in metres, and the robots' size too.
     """
     story = story_of(seed)
     random = np.random.default_rng([seed, 5])
@@ -60,7 +60,10 @@ def frontier(seed: int, scale: float | None = None) -> dict[str, Any]:
 
 
 def turn_of(story: Story) -> str:
-    """What is asked of a scene: groups where that has several things, else by its category."""
+    """Return what is asked of a scene: groups if several things are in it, else by its category.
+
+    Cages are never asked for in groups.
+    """
     if story.setup == "multi" and story.category != "caging":
         return "groups"
     return {"general": "ring", "infill": "infill", "caging": "cage"}[story.category]
@@ -71,19 +74,19 @@ Part = tuple[Thing, int, dict[str, Any], str]
 
 @dataclass(frozen=True)
 class Team:
-    """How its lengths are named, and how large its robots are."""
+    """The scale in which lengths are named, and the size of the robots."""
 
     scale: float | None
     across: Named | None
 
     @property
     def radius(self) -> float:
-        """Of a robot, px; 0 where its size is not named."""
+        """Radius of a robot, px; 0 if the size is not named."""
         return self.across.px / 2 if self.across else 0.0
 
     @property
     def words(self) -> str:
-        """A sentence that names the robots' size, if it is named."""
+        """A sentence that names the robots' size; empty if it is not named."""
         return f" The robots are {self.across.words} across." if self.across else ""
 
 
@@ -120,7 +123,7 @@ def _goal_and_words(
 
 
 def _several_groups(random: Generator, story: Story, team: Team) -> list[Part]:
-    """The target and up to two more things that a phrase tells, each with robots of its own."""
+    """Return groups about the target and up to two other things that a phrase tells apart."""
     view = View(story.scene.things, story.scene.size)
     others = [
         (thing, words)

@@ -1,6 +1,6 @@
-"""Success rules with lengths that an instruction names, from the proportions of the usual ones.
+"""Success rules with lengths named in an instruction, in the proportions of the usual rules.
 
-Lengths are pixels: that is what a picture without a scale allows, and what the tools work in.
+Lengths are in pixels, as a picture without a scale allows no others and the tools work in them.
 """
 
 import math
@@ -14,13 +14,13 @@ from ...scenes.success_rules import slack, success
 from ...scenes.things import Thing
 
 LEAST = 5
-"""A distance under this, px, is within what an outline can be off."""
+"""Least distance asked for, px; a smaller one is within the error of an outline."""
 FINE_GAP = 8.0
-"""Least distance of neighbours at which many robots are asked for, px."""
+"""Least distance between neighbours when many robots are asked for, px."""
 
 
 def ring_rule(thing: Thing, arrangement: str, robots: int, d: float, off: float) -> dict[str, Any]:
-    """A ring at a named distance d, px; robots may be `off` px nearer or farther."""
+    """Return the rule of a ring at a named distance d, px; robots may be `off` px off it."""
     rule = success(thing, arrangement, robots, "left")
     loop = thing.outline.filled.buffer(d).exterior.length
     band = [round(max(d - off, 1.0), 1), round(d + off, 1)]
@@ -31,7 +31,7 @@ def ring_rule(thing: Thing, arrangement: str, robots: int, d: float, off: float)
 
 
 def inner_rule(thing: Thing, robots: int, d: float, apart: float | None) -> dict[str, Any]:
-    """An infill at least d px from the edge and, if named, so many px from each other."""
+    """Return the rule of an infill at least d px from the edge and, if given, `apart` px apart."""
     rule = success(thing, "inside", robots, "left")
     cell = inner_cell(thing, robots, d)
     if d:
@@ -42,19 +42,19 @@ def inner_rule(thing: Thing, robots: int, d: float, apart: float | None) -> dict
 
 
 def inner_cell(thing: Thing, robots: int, d: float) -> float:
-    """Side of a robot's share of the region that is d px from the edge, px."""
+    """Return the side, px, of a robot's share of the region at least d px from the edge."""
     return math.sqrt(thing.polygon.buffer(-d).area / robots)
 
 
 def distance(random: Generator, thing: Thing, size: tuple[int, int]) -> int | None:
-    """A distance to keep outside a thing that leaves the ring in the picture; None: no room."""
+    """Choose a distance, px, of a ring about a thing that stays in the picture; None: no room."""
     most = int(min(0.3 * thing.size, room(thing, size) - 4))
     least = max(LEAST, round(0.08 * thing.size))
     return int(random.integers(least, most + 1)) if most >= least else None
 
 
 def margin(random: Generator, thing: Thing) -> int | None:
-    """A distance from the edge to keep inside a thing of one piece; None: too thin."""
+    """Choose a distance, px, to keep inside the edge of a thing of one piece; None: too thin."""
     most = int(0.12 * thing.outline.min_width)
     if most < 3:
         return None
@@ -65,9 +65,9 @@ def margin(random: Generator, thing: Thing) -> int | None:
 def many(
     random: Generator, thing: Thing, arrangement: str, bounds: tuple[int, int], wide: float = 0.0
 ) -> int:
-    """A number of robots within bounds that the thing has room for, small ones more often.
+    """Choose a number of robots, within bounds, that the thing has room for, small ones more often.
 
-    `wide` is the least distance of neighbours that robots of a size need, px.
+    `wide` is the least distance between neighbours that robots of a size need, px.
     """
     gap = max(FINE_GAP, wide)
     least, most = bounds

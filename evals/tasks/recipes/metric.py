@@ -1,6 +1,6 @@
-"""How an instruction names a length, in px or by a scale in metres, and the size of robots.
+"""Names of lengths in an instruction, in px or by a scale in metres, and the size of robots.
 
-Metres are rounded to two digits first and the rule made of those, so that words and rule agree.
+Metres are rounded to two digits first and the rule is made of those, so that words and rule agree.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from ...scenes.things import Thing
 from .length_rules import inner_cell
 
 RADII = (5, 11)
-"""Of robots whose size is named, px: the least is more than a distance that is held may be off."""
+"""Radii of robots whose size is named, px, the upper end excluded; all exceed `OFF`."""
 SPREAD = 2.6
-"""Least distance of robots' centres, in radii, where their size is named."""
+"""Least distance between robots' centres, in radii, if their size is named."""
 OFF = 4.0
-"""How far off its distance a robot whose size is named may stand, px, less than any radius."""
+"""How far off its distance a robot whose size is named may stand, px; less than any radius."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,10 @@ class Named:
 
 
 def named_length(px: float, scale: float | None) -> Named:
-    """A length as an instruction names it: about so many px.
+    """Return a length of about `px` as an instruction names it.
 
     Args:
-        px: whole where there is no scale.
+        px: a whole number if there is no scale.
         scale: metres per pixel, or None.
     """
     if scale is None:
@@ -49,7 +49,7 @@ def named_length(px: float, scale: float | None) -> Named:
 
 
 def robot_size(seed: int, scale: float | None) -> Named | None:
-    """How much robots are across, for every picture with a scale."""
+    """Return the diameter of a seed's robots; None for a picture without a scale."""
     if scale is None:
         return None
     radius = int(np.random.default_rng([seed, 7]).integers(*RADII))
@@ -59,7 +59,7 @@ def robot_size(seed: int, scale: float | None) -> Named | None:
 def fits(
     thing: Thing, size: tuple[int, int], rule: dict[str, Any], robots: int, across: float
 ) -> bool:
-    """Whether robots of a size have room where a rule has their centres."""
+    """Return whether robots `across` px wide have room where a rule puts their centres."""
     if rule["where"] == "inside":
         deep = rule["min_clearance_px"] + across / 2
         inner = thing.polygon.buffer(-deep)

@@ -17,21 +17,21 @@ from .metric import fits, named_length, robot_size
 STYLES = ("default", "simple", "strategy", "narrative", "structured")
 ROBOTS = (3, 64)
 NAMED = 0.5
-"""How often a length is named where there is room for one."""
+"""How often a length is named in a picture without a scale, if there is room for one."""
 OFF_SHARE, OFF = 0.25, 4.0
-"""How far off a named distance a robot may stand: this share of it, at least so many px."""
+"""How far off a named distance a robot may stand: this share of it, but at least so many px."""
 APART = 0.5
-"""A distance between robots that is named, as a share of a robot's cell."""
+"""The named distance between robots, as a share of a robot's cell."""
 Length = tuple[str, str]
 
 
 def styled(seed: int, scale: float | None = None) -> dict[str, Any]:
-    """The entry of annotations.json of a seed: its scene, with a task of its own.
+    """Return the entry of annotations.json of a seed: its scene, with a task of its own.
 
     Args:
         seed: of the scene.
-        scale: metres per pixel: lengths are named in metres, and the robots' size too where there
-            is room for it.
+        scale: metres per pixel; with it lengths are named in metres, and the robots' size too if
+            there is room for it.
     """
     story = story_of(seed)
     random = np.random.default_rng([seed, 4])
@@ -56,7 +56,7 @@ def _robots_for(random: Generator, story: Story, arrangement: str) -> int:
 def _rule(
     random: Generator, story: Story, what: tuple[str, str], robots: int, scale: float | None
 ) -> tuple[dict[str, Any], list[Length]]:
-    """The rule, and the length that the words name, if any: its kind and the words for it."""
+    """Return the rule, and the length that the words name, if any: its kind and its words."""
     arrangement, side = what
     thing, plain = story.target, success(story.target, arrangement, robots, side)
     if random.random() >= NAMED and scale is None:
@@ -88,7 +88,7 @@ def _sized(
     lengths: list[Length],
     scale: float,
 ) -> tuple[dict[str, Any], list[Length]]:
-    """The rule for robots of a named size, and it among the lengths, where a distance is named.
+    """Return rule and lengths for robots of a named size if a distance is named, else as given.
 
     Distances are to robots' edges, so that their centres stand half their size further off.
     """

@@ -1,4 +1,4 @@
-"""Instructions that are not to be carried out: asking or refusing is right, and moving is wrong."""
+"""Instructions that must not be carried out: asking or refusing is right, and moving is wrong."""
 
 import math
 from typing import Any
@@ -11,13 +11,13 @@ from ...scenes.things import Thing
 
 ABSENT = ("giraffe", "piano", "lighthouse", "bicycle", "umbrella stand", "telescope", "elephant")
 DENSEST = 2 / math.sqrt(3)
-"""Robots that fit, at a distance s, in s x s of a plane (hexagonal packing of discs)."""
+"""Most robots, at least s apart, per s x s of a plane (hexagonal packing of discs)."""
 ASK, REFUSE = "question", "impossible"
 KINDS = ("absent", "ambiguous", "few", "crowded", "vague", "uncounted")
 
 
 def unmet(seed: int) -> dict[str, Any]:
-    """The entry of annotations.json of a seed; what is wrong with its instruction takes turns."""
+    """Return the entry of annotations.json of a seed; successive seeds differ in what is wrong."""
     story = story_of(seed)
     random = np.random.default_rng([seed, 6])
     kind = KINDS[seed % len(KINDS)]
@@ -37,7 +37,7 @@ def unmet(seed: int) -> dict[str, Any]:
 def _words_and_robots(
     random: Generator, story: Story, kind: str
 ) -> tuple[str, int | None, tuple[str, ...]]:
-    """The words, the number of robots if one is given, and what is right."""
+    """Return the words, the number of robots if one is given, and the statuses that are right."""
     n, thing = int(random.integers(4, 13)), named(random, story)
     if kind == "absent":
         missing = ABSENT[random.integers(len(ABSENT))]
@@ -59,6 +59,6 @@ def _words_and_robots(
 
 
 def _one_of_several(story: Story) -> Thing | None:
-    """A thing of which there is another of the same noun."""
+    """Return a thing that shares its noun with another, or None."""
     nouns = [thing.sort.noun for thing in story.scene.things]
     return next((t for t in story.scene.things if nouns.count(t.sort.noun) > 1), None)

@@ -2,22 +2,25 @@
 
 import numpy as np
 import pytest
-from formup.evals.grading.slots import even_along, matched, phase_free
+from formup.evals.grading.slots import even_along, match_slots, phase_free
 from hypothesis import given
 from hypothesis import strategies as st
 
 
 def test_most_pairs_come_before_short_ones() -> None:
     points, slots = np.array([[0.8, 0], [2.0, 0]]), np.array([[0.0, 0], [1.0, 0]])
-    assert (matched(points, slots, 0.3) >= 0).sum() == 1
+    assert (match_slots(points, slots, 0.3) >= 0).sum() == 1
     crossed = np.array([[0.9, 0], [2.1, 0]]), np.array([[0.0, 0], [1.0, 0], [3.0, 0]])
-    assert matched(*crossed, 1.0).tolist() == [1, 2]
+    assert match_slots(*crossed, 1.0).tolist() == [1, 2]
     shifted = np.array([[1.0, 0], [2.0, 0]]), np.array([[0.0, 0], [1.0, 0]])
-    assert matched(*shifted, 1.0).tolist() == [0, 1]  # one pair at distance 0 would cost the other
+    assert match_slots(*shifted, 1.0).tolist() == [
+        0,
+        1,
+    ]  # one pair at distance 0 would cost the other
 
 
 def test_two_robots_in_one_slot_count_once() -> None:
-    assert sorted(matched(np.zeros((2, 2)), np.zeros((1, 2)), 1.0).tolist()) == [-1, 0]
+    assert sorted(match_slots(np.zeros((2, 2)), np.zeros((1, 2)), 1.0).tolist()) == [-1, 0]
 
 
 @given(st.integers(2, 40), st.floats(0, 1), st.floats(5, 500))

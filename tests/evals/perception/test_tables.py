@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from formup.apps.cli import app
-from formup.evals.perception.fit import CUES, fitted, left_out
+from formup.evals.perception.fit import CUES, fit_weights, held_out_likelihoods
 from formup.evals.perception.samples import TRIALS, Sample, measured
 from formup.evals.perception.tables import markdown, reliability, row
 from formup.tools.errors import InputError
@@ -41,7 +41,7 @@ def test_weights_are_found_again_and_never_below_zero() -> None:
     cues = random.uniform(0, 1, (4000, 2))
     likely = 1 / (1 + np.exp(-(-3 + 6 * cues[:, 0] - 2 * cues[:, 1])))
     right = (random.uniform(0, 1, 4000) < likely).astype(float)
-    constant, first, second = fitted(cues, right)
+    constant, first, second = fit_weights(cues, right)
     assert first == pytest.approx(6, rel=0.2)
     assert second == 0
     assert constant < -3
@@ -50,7 +50,7 @@ def test_weights_are_found_again_and_never_below_zero() -> None:
 def test_a_picture_left_out_says_nothing_of_itself() -> None:
     found = [sample(0.9, 0, "a")] * 10 + [sample(0.1, 0, "b")] * 10
     cues, right = np.zeros((20, 1)), np.repeat([1.0, 0.0], 10)
-    likely = left_out(found, cues, right)
+    likely = held_out_likelihoods(found, cues, right)
     assert (likely[:10] < 0.5).all() and (likely[10:] > 0.5).all()
 
 
