@@ -159,8 +159,8 @@ def resume(
             left = agent.say(left, words)
         elif answer is approve is None and isinstance(left.outcome, Answered | Paused):
             if isinstance(left.outcome, Paused) and not session.can_ask:
-                write_files(home, left)  # it may have been killed before it had written them
-                agent.resume(left)  # which says what it waits for
+                write_files(home, left)  # it may have been killed before writing them
+                agent.resume(left)  # raises an error that says what it waits for
         else:
             left = agent.resume(left, answer=answer, approve=approve)
         raise typer.Exit(session.serve(left))
@@ -182,7 +182,7 @@ def look_around(as_json: o.Json = False) -> None:
 
 
 def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
-    """A draft may have changed since a run was begun with it."""
+    """Check that no prompt, such as a draft, has changed since the run began; else InputError."""
     was = {prompt_name(p): p["sha256"] for p in start.get("prompts", ())}
     for prompt in agent.prompts:
         if was.get(prompt.name, prompt.sha256) != prompt.sha256:

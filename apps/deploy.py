@@ -84,7 +84,7 @@ def deploy(
 
 
 def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
-    """Write how robots would get to a plan from where the session beside it left them."""
+    """Write robots' trajectories to a plan from where the session left them; return exit code 0."""
     with _session(plan, context) as session:
         context = context.at(session.start(context.world))
     try:
@@ -99,7 +99,7 @@ def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
 
 
 async def _and_closed(context: Context, work: Awaitable[Made]) -> Made:
-    """What comes of the work, with the fleets, and cameras of theirs, let go of."""
+    """Return the result of the work, then close the fleets and their cameras, even if it fails."""
     try:
         return await work
     finally:
@@ -108,22 +108,26 @@ async def _and_closed(context: Context, work: Awaitable[Made]) -> Made:
 
 @dataclass
 class Session:
-    """The session that a plan.json lies beside, which learns where robots are; or none."""
+    """The session that a plan.json lies beside, kept up to date on its robots; or a stand-in.
+
+    Attributes:
+        world: the session's world; None if there is no session, so that nothing is recorded.
+    """
 
     recorder: LogRecorder
     world: World | None
 
     def start(self, world: World) -> World:
-        """A plan's world, with robots where the session left them."""
+        """Return a plan's world, with robots where the session left them."""
         return world if self.world is None else world.having(robots=self.world.robots)
 
     async def moving(self, plan_id: str) -> None:
-        """Write down that robots are about to move."""
+        """Record that robots are about to move."""
         if self.world is not None:
             await self.recorder.moving(plan_id, self.world)
 
     def end(self, world: World) -> None:
-        """Write down where robots are, and what was observed of a plan of the session."""
+        """Record where robots are, and the arrivals observed at plans of the session."""
         if self.world is None:
             return
         known = {n: a for n, a in world.arrivals.items() if n in self.world.plans}
@@ -133,7 +137,7 @@ class Session:
 
 @contextmanager
 def _session(plan: Path, context: Context) -> Generator[Session, None, None]:
-    """The session beside a plan.json; no other process may write it meanwhile."""
+    """Yield the session beside a plan.json, whose log no other process may write meanwhile."""
     artefacts, path = context.services.artefacts, plan.parent / NAME
     if not path.exists():
         yield Session(LogRecorder(None, artefacts, None, None), None)
@@ -151,7 +155,7 @@ def _driven(
     session: Session,
     keep: Callable[[World], None],
 ) -> World:
-    """The world after the robots have driven; where they failed on the way, with what was seen."""
+    """Drive the robots and return the world after it; if they fail on the way, as last observed."""
     observed: list[World] = []
     watching = replace(context, observed=observed.append, moving=session.moving, agreed=True)
     try:
