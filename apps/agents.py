@@ -66,7 +66,7 @@ def agent_of(
 
 @contextmanager
 def tracer_of_environment() -> "Generator[Tracer | None, None, None]":
-    """Yield the tracer that the environment asks for, if any; if it fails, say so and yield None."""
+    """Yield the tracer that the environment asks for, if any; if it fails, say so, yield None."""
     with ExitStack() as stack:
         tracer = None
         try:

@@ -1,4 +1,4 @@
-"""What a client may read of a session, and a prompt that begins one."""
+"""MCP resources, through which a client reads a session, and a prompt that begins one."""
 
 import asyncio
 import json
@@ -56,7 +56,7 @@ def formation(image: str, wish: str, robots: str = "as many as it takes") -> str
 
 
 def add_resources(server: MCPServer[Access]) -> None:
-    """Offer them."""
+    """Register the resources and the prompt with the server."""
     server.resource(f"{ROOT}/scene", mime_type=JPEG)(scene)
     server.resource(f"{ROOT}/plans/{{plan_id}}", mime_type=JSON)(plan)
     server.resource(f"{ROOT}/plans/{{plan_id}}/certificate", mime_type=JSON)(certificate)

@@ -1,8 +1,8 @@
-"""The tools that a client sees: few, each one thing a person wants of the whole team.
+"""The tools of the MCP server: few, each one thing that a person wants of the whole team.
 
-No argument of any of them is a person's yes: words plan and never move robots here, and real ones
-are driven only after a person was asked, through the client where it can ask. The nonce which that
-yes has to name never leaves the server.
+No tool takes a person's approval as an argument: words plan here and never move robots, and real
+ones drive only after a person was asked, through the client if it can ask. The nonce that an
+approval must name never leaves the server.
 """
 
 import asyncio
@@ -68,7 +68,7 @@ async def open_scene(
         robot_radius=robot_radius,
         clearance=clearance,
     )
-    ToolContext.of(seen, settings)  # what cannot be is said before anything is kept
+    ToolContext.of(seen, settings)  # raises before anything is stored
     made = hub.service.open(seen, settings=settings, owner=person.name)
     return await standing(ctx, made, picture=picture)
 
@@ -138,7 +138,7 @@ class Yes(BaseModel):
 
 
 def _key_of_yes(idempotency_key: str) -> str:
-    """The key of the turn that follows a person's answer to a call."""
+    """Return the idempotency key of the turn that follows a person's answer to a call."""
     return f"{idempotency_key}/answer"
 
 
@@ -146,10 +146,10 @@ def _key_of_yes(idempotency_key: str) -> str:
 async def ask_person(
     ctx: Ctx, session: str, plan_id: str, idempotency_key: str
 ) -> Elicit[Yes] | str:
-    """Begin to drive; where a person has to say yes first, ask them.
+    """Begin to drive; if a person has to approve it first, ask them.
 
     Returns:
-        The question, or what is told before how the session stands, where nobody is asked.
+        The question, or, if nobody is asked, text to put before the message of the session's state.
     """
     service, person = await permitted(ctx, session, "move")
     planned(service.session(session), plan_id)
@@ -171,7 +171,7 @@ async def ask_person(
 
 
 def _can_ask(ctx: Ctx) -> bool:
-    """Whether the client shows forms to a person; one that names no kind shows forms."""
+    """Return whether the client shows forms to a person; one that names no kind shows forms."""
     declared = ctx.client_capabilities
     offers = None if declared is None else declared.elicitation
     return offers is not None and (offers.form is not None or offers.url is None)
@@ -213,7 +213,7 @@ async def stop(ctx: Ctx, session: ASession) -> Told:
 
 
 def add_tools(server: MCPServer[Access]) -> None:
-    """Offer them."""
+    """Register the tools with the server."""
     for tool in (open_scene, instruct, edit, stop):
         hints = ToolAnnotations(destructive_hint=False, open_world_hint=False)
         server.add_tool(tool, annotations=hints)
