@@ -173,7 +173,7 @@ class Window:
         self._draw_figures(screen)
 
     def _draw_ways(self, screen: "Surface") -> None:
-        """Draw fading trails behind robots, lines to their places, and a followed thing's outline."""
+        """Draw fading trails behind robots, lines to their places, a followed thing's outline."""
         course, draw, at = self._course, self._pygame.draw, self._ground.canvas.at
         trail = np.stack([at(points) for points in course.trail])
         links = [at(link) for link in course.links if len(course.links) <= NUMBERED]

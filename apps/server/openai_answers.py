@@ -1,6 +1,6 @@
-"""What a chat client is answered: a turn is begun, awaited, and told in Markdown with its picture.
+"""The answers to chat clients: a turn is begun, awaited, and reported in Markdown with a picture.
 
-A turn goes on when its client has gone, and the same request sent again finds it.
+A turn goes on if its client disconnects, and the same request sent again finds it.
 """
 
 import asyncio
@@ -32,9 +32,9 @@ from .sessions import check_room, checked_picture
 from .tokens import Person
 
 USUAL = "formup"
-"""What the usual agent is called."""
+"""The model name of the default agent."""
 BEAT, DRIVING = 5.0, 20.0
-"""Seconds between signs of life, and for which robots that drive are waited for."""
+"""Seconds between heartbeats, and the longest wait, in seconds, for robots that are driving."""
 NEEDED = (
     "I need a picture of the place, and what the robots should do there: attach one picture, and "
     "say for example *Surround the largest coin with 6 robots*."
@@ -53,15 +53,15 @@ NOTHING_MOVES = (
 )
 DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
-"""What would make a link, a picture or HTML of words that a model may have read in a picture."""
+"""Characters to escape, so that text a model read in a picture is no link, picture or HTML."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a client is told.
+    """An answer to a client.
 
     Attributes:
-        place: the turn that it came of; None for none.
+        place: the turn that it is about; None for none.
     """
 
     text: str
@@ -69,13 +69,13 @@ class Answer:
     usage: Totals = field(default_factory=Totals)
 
     async def told(self) -> AsyncGenerator["Answer"]:
-        """Itself, at once."""
+        """Yield this answer."""
         yield self
 
 
 @dataclass(frozen=True)
 class Begun:
-    """A turn on its way."""
+    """A turn that has begun, to be answered when it ends."""
 
     base: str
     session: str
@@ -83,14 +83,16 @@ class Begun:
 
     @property
     def place(self) -> Place:
-        """Where it is."""
+        """The session and number of the turn."""
         return Place(self.session, self.turn.number)
 
     async def told(self) -> AsyncGenerator[Answer | None]:
-        """What came of it, or that robots drive for long; before that None, as signs of life.
+        """Yield None as a heartbeat until the turn ends, then its answer.
+
+        Once robots have driven for `DRIVING` seconds, the answer is a note that they still do.
 
         Raises:
-            FormupError: it came to nothing.
+            FormupError: the turn failed.
         """
         moves = None
         while not self.turn.task.done():
@@ -106,13 +108,13 @@ class Begun:
 
 
 async def awaited(begun: Answer | Begun) -> Answer:
-    """What there is to tell, once it is there."""
+    """Wait for the answer and return it."""
     answers = [answer async for answer in begun.told() if answer is not None]
     return answers[-1]
 
 
 def problem(error: Exception) -> str:
-    """What a client is told of an error; only the log has what is our own."""
+    """Return what a client is told of an error; internal errors go to the log alone."""
     if isinstance(error, FormupError):
         return str(error)
     logging.getLogger("formup").error("a turn broke", exc_info=error)
@@ -120,24 +122,24 @@ def problem(error: Exception) -> str:
 
 
 def base_of(request: Request, hub: Hub) -> str:
-    """The address of this server, as browsers reach it."""
+    """Return the address of this server, as browsers reach it."""
     return (hub.settings.public_url or str(request.base_url)).rstrip("/")
 
 
 def agents(hub: Hub) -> dict[str, str]:
-    """Names of agents by what clients call them; the usual one first."""
+    """Return the agents' names by the model names that clients use, the default one first."""
     usual, *others = hub.service.agents
     return {USUAL: usual, **{name: name for name in others}}
 
 
 async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Begun:
-    """Do what a request says, as far as its beginning.
+    """Begin the turn that a request asks for, or answer it at once if it needs none.
 
     Args:
         base: the address of this server.
 
     Raises:
-        InputError: it cannot be done.
+        InputError: the request cannot be carried out.
     """
     if said.model not in agents(hub):
         there = ", ".join(agents(hub))
@@ -146,7 +148,7 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
         )
     if (answer := chore(said)) is not None:
         return Answer(answer)
-    if said.place is not None and not said.since:  # nothing has been said since our answer
+    if said.place is not None and not said.since:  # no new message since our answer
         check_owner(said.place.session, person)
         return await told(said.place, await run_at(hub, said.place), base)
     _check(said.last)
@@ -172,10 +174,10 @@ async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Beg
 
 
 async def _instead(hub: Hub, session: str, said: Said, base: str, error: InputError) -> Answer:
-    """What is told where a turn does not begin.
+    """Return the answer where a turn could not begin: repeated, not allowed, or busy.
 
     Raises:
-        InputError: that one, where it is no answer.
+        InputError: the error itself, if it is none of these.
     """
     if error.kind == "repeated":
         place = Place(session, error.facts["turn"])
@@ -190,7 +192,7 @@ async def _instead(hub: Hub, session: str, said: Said, base: str, error: InputEr
 
 
 async def told(place: Place, run: Run, base: str) -> Answer:
-    """What came of a turn, with its picture, which lies in its session."""
+    """Return the answer to a finished turn, and store its picture in the session."""
     report, choices = run.report, run.report.candidates or ()
     message = BROKEN_OFF if isinstance(run.outcome, Cancelled) else report.message
     lines = [message]
@@ -211,13 +213,13 @@ async def told(place: Place, run: Run, base: str) -> Answer:
 
 
 async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | None) -> Turn | None:
-    """The turn that a request begins; None where it says nothing new.
+    """Start the turn that a request asks for; return None if it says nothing new.
 
     Raises:
-        InputError: it cannot begin, or was there before.
+        InputError: the turn cannot begin, or repeats an earlier one.
     """
     held, turn, words = await hub.service.fresh(session), None, said.last.text
-    if held.run is None and not words:  # they came before the picture
+    if held.run is None and not words:  # the words came in a message before the picture
         words = next((m.text for m in reversed(said.users) if m.text), "")
     for address in said.last.pictures:
         data = _data(address)
@@ -236,7 +238,11 @@ async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | N
 
 
 async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str] | None:
-    """A new session, or the one that the same message began just now; None without a picture."""
+    """Open a session, unless the same message has just opened one.
+
+    Returns:
+        The session's id and the key of the turn; None if the messages lack a picture or words.
+    """
     pictured = [m for m in said.users if m.pictures]
     if not pictured or not any(m.text for m in said.users):
         return None
@@ -257,7 +263,11 @@ async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str]
 
 
 async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer | None:
-    """Hold the robots, whoever asks and whatever has happened since; None where nobody does."""
+    """Hold the robots if a stop is asked for, whoever asks and whatever has happened since.
+
+    Returns:
+        The answer; None if no stop is asked for.
+    """
     if not is_stop(said.last.text, driving=True):
         return None
     found = await find(hub, person, said, here=True)
@@ -271,10 +281,10 @@ async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer | Non
 
 
 def _data(address: str) -> bytes:
-    """What a data URL holds; nothing is ever fetched.
+    """Decode the data URL of a picture; nothing is ever fetched.
 
     Raises:
-        InputError: it is none of a picture.
+        InputError: the address is not a data URL of a picture.
     """
     head = DATA.match(address)
     if head is None:
@@ -290,7 +300,7 @@ def _data(address: str) -> bytes:
 
 
 def _check(message: Message) -> None:
-    """Refuse parts of a message that would be left out without a word."""
+    """Refuse parts of a message that would otherwise be silently ignored."""
     if message.others:
         raise InputError(
             f"A message may hold text and a picture; this one holds {message.others[0][:40]!r}."
@@ -302,7 +312,7 @@ def _check(message: Message) -> None:
 
 
 def _picture(run: Run) -> bytes | None:
-    """What a turn shows: choices, or the plan that it was about."""
+    """Return the picture of a turn as PNG: its choices or its plan; None if it shows neither."""
     report, file = run.report, io.BytesIO()
     node = run.world.plans.get(report.plan_id or "")
     if report.candidates:
@@ -316,6 +326,6 @@ def _picture(run: Run) -> bytes | None:
 
 
 def _at_once(text: str, base: str, place: Place | None, usage: Totals | None = None) -> Answer:
-    """An answer without a picture: a definition that Markdown does not show has its place."""
+    """Return an answer without a picture, its place in a link definition, which Markdown hides."""
     mark = f"\n\n[formup]: {base}{place.path}" if place else ""
     return Answer(text + mark, place, usage or Totals())

@@ -1,4 +1,4 @@
-"""Chat completions as OpenAI has them, the models there are, and the pictures of answers."""
+"""The routes of OpenAI's Chat Completions, of the list of models, and of pictures in answers."""
 
 import asyncio
 import secrets
@@ -79,7 +79,7 @@ async def picture(
 async def _chunks(
     begun: Answer | Begun, facts: dict[str, Any], usage: bool
 ) -> AsyncGenerator[bytes]:
-    """An answer as it comes."""
+    """Yield an answer as the chunks of a streamed chat completion."""
 
     def chunk(*choices: Any, **more: Any) -> bytes:
         kind = {"object": "chat.completion.chunk", "choices": choices}
@@ -105,7 +105,7 @@ async def _chunks(
 
 
 def frame(data: dict[str, Any], event: str | None = None) -> bytes:
-    """A server-sent event."""
+    """Return a server-sent event."""
     named = f"event: {event}\n".encode() if event else b""
     return named + b"data: " + to_json(data) + b"\n\n"
 

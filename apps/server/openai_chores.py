@@ -1,7 +1,7 @@
-"""What chat programs ask of the model for themselves: titles, tags, suggestions, search queries.
+"""Chores, which chat programs ask of the model for themselves: titles, tags, search queries.
 
-Taken for words of a person these would be orders to robots: they are told by several signs and
-answered here, without a turn, a tool, or a look at any session.
+Taken for a person's words, these would be orders to robots. They are recognized by several signs
+and answered here, without a turn, a tool, or a look at any session.
 """
 
 import re
@@ -12,7 +12,7 @@ from pydantic_core import to_json
 from .openai_request import Said
 
 TASK = re.compile(r"\w+_generation|function_calling")
-"""How Open WebUI names chores, where it does."""
+"""The names that Open WebUI gives to chores, where it names them."""
 KNOWN = re.compile(
     r"\s*#+ *\**task\b|.*<chat_history>"
     r"|.*return the correct tool\(s\) from the list of available tools"
@@ -30,9 +30,9 @@ SIGNS = (
         re.I,
     ),
 )
-"""What is wanted, of what, in which form: only all three make a chore."""
+"""What is wanted, about what, in which form: only all three signs together make a chore."""
 HEAD = 400
-"""Characters of a system's message that tell a chore; long ones speak of everything."""
+"""Characters of a system message to search for signs; long messages mention everything."""
 SUGGESTIONS = ("A bit further out", "How far apart are the robots?", "Undo")
 KINDS: tuple[tuple[str, str, object], ...] = (
     (r"tool_calls|function_calling", "tool_calls", ()),
@@ -42,7 +42,7 @@ KINDS: tuple[tuple[str, str, object], ...] = (
     (r"search quer|query_", "queries", ()),
     (r"\bimage generation\b|image_prompt", "prompt", ""),
 )
-"""By what each is told, and what it is given."""
+"""For each kind of chore, its pattern, and the name and value that it is answered with."""
 TITLE = re.compile(r"\b(title|name)\b|title_", re.I)
 SPOKEN = re.compile(r"^\W*(?:user|human)\W*?: *(\S.*)$", re.I | re.M)
 HISTORY = re.compile(r"<chat_history>|^\W*(?:user|human)\W*?:", re.I | re.M)
@@ -53,7 +53,7 @@ NOTHING = (
 
 
 def chore(said: Said) -> str | None:
-    """The answer to a chore; None for what a person says."""
+    """Return the answer to a chore; None if the message is a person's."""
     text, system = said.last.text, said.system
     told = text if _tells(text, None) else system if _tells(system, HEAD) else ""
     if not told and not TASK.fullmatch(said.task):
@@ -72,12 +72,12 @@ def chore(said: Said) -> str | None:
 
 
 def _tells(text: str, head: int | None) -> bool:
-    """Whether a text is that of a chore, by its very words or by all signs in its beginning."""
+    """Return whether a text is a chore, by known wording or by all signs within its head."""
     return bool(KNOWN.match(text)) or all(sign.search(text[:head]) for sign in SIGNS)
 
 
 def _title(said: Said) -> str:
-    """A title from what the person said first."""
+    """Return a title made from the person's first message."""
     quoted = SPOKEN.search(said.last.text)
     first = quoted[1] if quoted else said.users[0].text if len(said.users) > 1 else ""
     return textwrap.shorten(first, 50, placeholder="…") or "Robots"

@@ -1,4 +1,4 @@
-"""Responses as OpenAI has them: each is a turn of a session, found again by its id."""
+"""The routes of OpenAI's Responses API: each response is a turn, found again by its id."""
 
 import secrets
 import time
@@ -44,7 +44,7 @@ async def again(response: str, request: Request, hub: AHub, person: APerson) -> 
 
 
 async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerator[bytes]:
-    """A response as it comes, in the order that OpenAI's has."""
+    """Yield the events of a streamed response, in the order of OpenAI's."""
     number = 0
 
     def event(kind: str, **data: Any) -> bytes:
@@ -78,7 +78,7 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
 
 
 def _response(begun: Answer | Begun, model: str) -> dict[str, Any]:
-    """A response before it has come to anything."""
+    """Return a response that is still in progress."""
     place = begun.place
     made_of = f"{place.session}_{place.turn}" if place else f"none_{secrets.token_hex(8)}"
     return {
@@ -100,7 +100,7 @@ def _response(begun: Answer | Begun, model: str) -> dict[str, Any]:
 
 
 def _completed(answer: Answer, facts: dict[str, Any]) -> dict[str, Any]:
-    """A response at its end."""
+    """Return a completed response."""
     used, item = answer.usage, f"msg_{facts['id'].removeprefix('resp_')}"
     usage = {
         "input_tokens": used.input_tokens,
@@ -114,7 +114,7 @@ def _completed(answer: Answer, facts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _message(item: str, text: str | None = None) -> dict[str, Any]:
-    """The one item of a response; without text while it is under way."""
+    """Return the one item of a response; without text while it is in progress."""
     status, content = "in_progress" if text is None else "completed", [_part(text or "")]
     said = {"role": "assistant", "status": status, "content": content if text is not None else []}
     return {"id": item, "type": "message", **said}

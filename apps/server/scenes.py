@@ -1,6 +1,6 @@
-"""What a page looks at: the picture, things in it, plans as numbers, what would come of an edit.
+"""The routes a page draws from: the picture, things in it, plans as numbers, previews of edits.
 
-Nothing here changes a session; what is tried becomes true by a turn alone.
+Nothing here changes a session; only a turn applies an edit that was tried.
 """
 
 import asyncio
@@ -24,11 +24,11 @@ from .tokens import Person
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["page"], responses=ERRORS)
 LONGEST = 2048
-"""Long side, px, of a picture that a page is given; coordinates are those of the whole one."""
+"""Longest side, px, of a picture sent to a page; coordinates are those of the original."""
 
 
 def plainly(error: ToolError) -> InputError:
-    """What a tool cannot do, said to a person."""
+    """Return a tool's error as an InputError, worded for a person where the tool has such words."""
     return InputError(str(error.facts.get("plain", error)), error.kind)
 
 

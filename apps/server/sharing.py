@@ -1,4 +1,4 @@
-"""What leaves a session: a file of all that was said and planned, and links that only show it."""
+"""The routes that share a session: an export of all it holds, and codes that only show it."""
 
 import asyncio
 import io
