@@ -163,7 +163,7 @@ def _digits(number: str) -> str:
 
 
 _PLAIN = " \t\u200c\u200d"
-"""White space, and the zero-width joiners that some scripts need."""
+"""Space, tab, and the zero-width joiners that some scripts need."""
 
 
 def _confusable(line: str) -> Iterator[str]:

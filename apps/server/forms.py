@@ -16,7 +16,7 @@ Pointed = Annotated[tuple[TargetPrompt, ...], Field(max_length=100)]
 
 
 class Form(BaseModel):
-    """JSON from a client; fields that there are not are refused."""
+    """JSON from a client; unknown fields are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

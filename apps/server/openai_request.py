@@ -79,7 +79,7 @@ class Message(BaseModel):
 
 
 class Body(BaseModel):
-    """What both forms have; what else they may have changes nothing here."""
+    """The fields used from both formats; any others are ignored."""
 
     model: str = Field(min_length=1, max_length=200)
     stream: bool | None = None

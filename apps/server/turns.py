@@ -27,7 +27,7 @@ RUNNING: dict[int | str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Asking:
-    """Who asks for a turn of which session, and how long they wait for its end."""
+    """A request for a turn: who asks, in which session, and how long they wait for its end."""
 
     hub: Hub
     session: str
