@@ -256,7 +256,7 @@ def numbered(groups: Iterable[Things]) -> Things:
     return tuple(t.model_copy(update={"id": f"t{i}"}) for i, t in enumerate(things, start=1))
 
 
-def kept_out(texts: list[str] | None) -> tuple[TargetPrompt, ...]:
+def keep_out_things(texts: list[str] | None) -> tuple[TargetPrompt, ...]:
     """Parse what no robot may enter; the count of numbers tells point, box, outline, candidate.
 
     Raises:

@@ -91,7 +91,7 @@ def chat(
     picture = picture_given(ctx.params)
     settings = settings_given(ctx.params, picture)
     things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
-    begin = Beginning(picture, session, things, arguments.kept_out(keep_out), settings)
+    begin = Beginning(picture, session, things, arguments.keep_out_things(keep_out), settings)
     rules, (lines, display) = _rules(policy, auto, plan_only), _front(script, as_json, plain)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
     with chosen(model) as agent, Folder(out) as home, watching(watch, stays=False) as services:

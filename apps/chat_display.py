@@ -32,16 +32,16 @@ class Display:
         self._console = console
         self._way: Way = way
         self._last = 0.0
-        self._told, self._open = "", False  # the reply shown so far; is its line open
+        self._streamed, self._open = "", False  # the reply shown so far; is its line open
 
     def fragment(self, text: str | None) -> None:
         """Show more of a reply's text as it streams; None voids what was shown of it."""
         if text is None:
-            if self._told:
+            if self._streamed:
                 self.line("note", "The reply broke off; it begins anew.")
-            self._told = ""
+            self._streamed = ""
             return
-        begins = not self._told
+        begins = not self._streamed
         text = text.lstrip() if begins else text
         if not text:
             return
@@ -50,7 +50,7 @@ class Display:
         else:
             name = (NAMED.format("formup") if begins else "", "cyan")
             self._console.print(styled(name, under(text, COLUMN)), end="", soft_wrap=True)
-        self._told, self._open = self._told + text, True
+        self._streamed, self._open = self._streamed + text, True
 
     def step(self, message: Message) -> None:
         """Show a message of a turn as it comes."""
@@ -58,8 +58,8 @@ class Display:
         self._last = now
         if isinstance(message, Reply) and not message.calls:
             return  # `show` prints its text
-        told, self._told = self._told, ""
-        if isinstance(message, Reply) and message.text.strip() and not told:
+        streamed, self._streamed = self._streamed, ""
+        if isinstance(message, Reply) and message.text.strip() and not streamed:
             self.line("formup", message.text)
         elif isinstance(message, Result) and message.name != "ask_user":
             failed = f" ({message.error})" if message.error else ""
@@ -68,12 +68,12 @@ class Display:
     def show(self, shown: Shown, folder: Path) -> None:
         """Show the result of a line, whose files are in the folder."""
         report = shown.report
-        told, self._told = self._told.rstrip(), ""
-        rest = report.message.strip().removeprefix(told).lstrip()
+        streamed, self._streamed = self._streamed.rstrip(), ""
+        rest = report.message.strip().removeprefix(streamed).lstrip()
         self._end_line()
         status = "" if report.status == "answered" else report.status
         head = f"{status}: " if status and rest else status
-        if told and not (head or rest):
+        if streamed and not (head or rest):
             return
         if self._console is None:
             say(f"formup: {head}{rest}")

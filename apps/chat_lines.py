@@ -98,7 +98,7 @@ class Talk:
         self._turn += 1
         if isinstance(done, Run):
             return self._shown(before, done)
-        now = replace(self.run, report=self._told(text, done or "Bye."))
+        now = replace(self.run, report=self._unchanged_report(text, done or "Bye."))
         drawn = command is not None and command.draws
         return self._finished(
             now, self._parent(now) if drawn else None, drawn=drawn, ends=done is None
@@ -115,7 +115,7 @@ class Talk:
     def failed(self, text: str, message: str) -> Shown:
         """Return the result of a line that could not be carried out, with that message."""
         self._turn += 1
-        report = self._told(text, message).model_copy(update={"status": "failed"})
+        report = self._unchanged_report(text, message).model_copy(update={"status": "failed"})
         return Shown(self._turn, replace(self.run, report=report))
 
     def words(self) -> list[str]:
@@ -157,7 +157,7 @@ class Talk:
         parent = plans.get((node and node.parent) or "")
         return parent and parent.plan
 
-    def _told(self, text: str, message: str) -> Report:
+    def _unchanged_report(self, text: str, message: str) -> Report:
         """Return the report on a line that changed nothing."""
         same = {"candidates": None, "arrival": None, "usage": Totals(), "files": None}
         said = {"status": "answered", "message": message, "instruction": text}

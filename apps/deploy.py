@@ -63,7 +63,7 @@ def deploy(
     if chosen.partial is not None:
         say(f"formup: a partial plan: {chosen.partial.sentence}", error=True)
     if trajectories is not None:
-        raise typer.Exit(_exported(context, chosen, plan, trajectories))
+        raise typer.Exit(_export_trajectories(context, chosen, plan, trajectories))
 
     def keep(world: World) -> None:
         write_whole(plan, plan_file(world, chosen.id, stored.instruction or "", picture))
@@ -72,7 +72,7 @@ def deploy(
         context.services.view = services.view
         with _session(plan, context) as session:
             context = context.at(session.start(context.world))
-            context = context.at(_driven(context, chosen, leave, plan, session, keep))
+            context = context.at(_drive_robots(context, chosen, leave, plan, session, keep))
         films = write_films(plan.parent, film, context, chosen, context.words)
         report = _report(chosen, context.world, stored, films)
         if as_json:
@@ -83,12 +83,12 @@ def deploy(
         raise typer.Exit(report.exit_code)
 
 
-def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
+def _export_trajectories(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
     """Write robots' trajectories to a plan from where the session left them; return exit code 0."""
     with _session(plan, context) as session:
         context = context.at(session.start(context.world))
     try:
-        found = asyncio.run(_and_closed(context, trajectories_to(context, chosen)))
+        found = asyncio.run(_closing_fleets(context, trajectories_to(context, chosen)))
     except ToolError as error:
         raise InputError(f"{plan}: {error}") from None
     scale = context.world.metres_per_pixel
@@ -98,7 +98,7 @@ def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
     return 0
 
 
-async def _and_closed(context: Context, work: Awaitable[Made]) -> Made:
+async def _closing_fleets(context: Context, work: Awaitable[Made]) -> Made:
     """Return the result of the work, then close the fleets and their cameras, even if it fails."""
     try:
         return await work
@@ -147,7 +147,7 @@ def _session(plan: Path, context: Context) -> Generator[Session, None, None]:
         yield Session(LogRecorder(log, artefacts, world, None), world)
 
 
-def _driven(
+def _drive_robots(
     context: Context,
     plan: Plan,
     follow: Follow | None,
@@ -160,7 +160,7 @@ def _driven(
     watching = replace(context, observed=observed.append, moving=session.moving, agreed=True)
     try:
         node = watching.world.plan(plan.id)
-        driven = asyncio.run(_and_closed(context, drive_to(watching, node, follow)))
+        driven = asyncio.run(_closing_fleets(context, drive_to(watching, node, follow)))
         observed.append(driven[1])
     except ToolError as error:
         raise InputError(f"{path}: {error}") from None

@@ -34,7 +34,7 @@ PURPOSES = {
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
 
 
-def told(*, as_json: bool) -> str:
+def findings_text(*, as_json: bool) -> str:
     """Return all findings, as JSON or, for a person, one per line."""
     found: dict[str, dict[str, str]] = {}
     noise = io.StringIO()  # packages may print when imported

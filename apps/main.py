@@ -54,7 +54,7 @@ def _say_broken(error: Exception) -> int:
     from . import doctor
 
     if sys.argv[1:2] == ["doctor"]:
-        print(visible(doctor.told(as_json="--json" in sys.argv)))  # noqa: T201
+        print(visible(doctor.findings_text(as_json="--json" in sys.argv)))  # noqa: T201
         return 0
     advice = "formup doctor says what is broken; install that anew."
     print(f"formup: {visible(str(error))}; {advice}", file=sys.stderr)  # noqa: T201

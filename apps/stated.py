@@ -22,7 +22,7 @@ Who = tuple[str | StatedContract, str | None]
 CANDIDATE = re.compile(r'(?<!"text":)(?<!"text": )"(c[1-9][0-9]{0,3})"')
 
 
-def decided(
+def resolve_decider(
     path: Path | None,
     pointed: Things,
     kept: Things,

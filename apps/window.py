@@ -118,7 +118,7 @@ class Window:
         began = time.perf_counter()
         for event in self._pygame.event.get():
             self._changed = True
-            if not self._heed(event):
+            if not self._handle_event(event):
                 return False
         if self._changed and self._course.poses:
             self._changed = False
@@ -127,7 +127,7 @@ class Window:
         self._took = time.perf_counter() - began
         return True
 
-    def _heed(self, event: "Event") -> bool:
+    def _handle_event(self, event: "Event") -> bool:
         """Handle an event; return False if it closes the window."""
         pygame, ground = self._pygame, self._ground
         if event.type == pygame.MOUSEWHEEL:

@@ -47,7 +47,7 @@ class Counted:
             self._seqs[topic].append(message["seq"])
             self.late.append(time.monotonic() - message.get("sent", 0.0))
 
-    def told(self) -> tuple[int, int]:
+    def counts(self) -> tuple[int, int]:
         """Return the messages received, and those missing between each robot's first and last."""
         wanted = sum(max(s) - min(s) + 1 for s in self._seqs.values())
         came = sum(len(set(s)) for s in self._seqs.values())
@@ -127,7 +127,7 @@ def _measured(settings: MqttSettings, seconds: float) -> None:
     done.set()
     goals, missed = ours.recv()
     process.join()
-    came, lost = fleet.counted.told()
+    came, lost = fleet.counted.counts()
     late = 1000 * np.array(fleet.counted.late)
     p50, p99 = np.percentile(late, [50, 99])
     ids = len(settings.robots)
@@ -159,7 +159,7 @@ async def _drive(fleet: Driver, seconds: float) -> tuple[int, float, float]:
 def _stand_in(settings: MqttSettings, done: Event, results: Connection) -> None:
     robots = Robots(settings)
     robots.run(done.is_set)
-    results.send(robots.counted.told())
+    results.send(robots.counted.counts())
     robots.close()
 
 

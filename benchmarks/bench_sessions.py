@@ -68,7 +68,7 @@ def picture() -> Picture:
     return picture_from_array(pixels)
 
 
-def begun(folder: Path) -> Run:
+def first_run(folder: Path) -> Run:
     """Return the run of a session of one turn, planned offline."""
     settings = Settings(robots=ROBOTS, may_deploy=False)
     stored = FolderStore(folder).create()
@@ -77,7 +77,7 @@ def begun(folder: Path) -> Run:
 
 def long_session(turns: int, folder: Path) -> tuple[tuple[Event, ...], tuple[bytes, ...]]:
     """Return the events and files of a session of a number of turns."""
-    first = begun(folder)
+    first = first_run(folder)
     assert first.stored is not None and first.report.plan_id is not None
     log = Listed(first.stored.events())
     files = files_named(log.written, first.stored.artefacts)
@@ -85,11 +85,11 @@ def long_session(turns: int, folder: Path) -> tuple[tuple[Event, ...], tuple[byt
     start = first.outcome.messages[0]
     assert isinstance(start, User)
     settings = to_json_values(first.context.settings)
-    asyncio.run(written(recorder, first.world, start.text, settings, turns))
+    asyncio.run(record_turns(recorder, first.world, start.text, settings, turns))
     return tuple(log.written), files
 
 
-async def written(
+async def record_turns(
     recorder: LogRecorder, world: World, start: str, settings: Any, turns: int
 ) -> None:
     """Record the turns after the first, up to number `turns`."""
@@ -97,9 +97,9 @@ async def written(
         words = f"A bit further out than in turn {number - 1}"
         await recorder.event("turn", {"words": words, "settings": settings})
         before, world = world, edited(world, number)
-        for message in said(number, words, start, world):
+        for message in turn_messages(number, words, start, world):
             await recorder.message(message, before if isinstance(message, User) else world)
-        await recorder.end(world, ended(world))
+        await recorder.end(world, end_data(world))
 
 
 def edited(world: World, number: int) -> World:
@@ -111,7 +111,7 @@ def edited(world: World, number: int) -> World:
     return world.with_plan(PlanNode(plan=plan, parent=world.current, edit='[{"kind": "out"}]'))
 
 
-def said(number: int, words: str, start: str, world: World) -> Iterator[Message]:
+def turn_messages(number: int, words: str, start: str, world: World) -> Iterator[Message]:
     """Yield the messages of a turn that makes an edit."""
     standing = {
         "plan": world.current,
@@ -138,7 +138,7 @@ def said(number: int, words: str, start: str, world: World) -> Iterator[Message]
     yield Reply(text=f"All {ROBOTS} robots stand 12.5 px further out (plan {world.current}).")
 
 
-def ended(world: World) -> dict[str, Any]:
+def end_data(world: World) -> dict[str, Any]:
     """Return the data of the event that ends a turn."""
     usage = {"requests": 2, "tool_calls": 1, "input_tokens": 8_000, "output_tokens": 90}
     return {

@@ -16,7 +16,7 @@ from ...agent.conversation import Session
 from ...agent.service import Service
 from ...tools.errors import FormupError, InputError
 from ...tools.perception.image import Picture, load_picture
-from ..server.hub import Hub, check_owner, need
+from ..server.hub import Hub, check_owner, require_scope
 from ..server.sessions import checked_picture
 from ..server.tokens import Person, Scope
 
@@ -46,7 +46,7 @@ def caller(ctx: Ctx) -> tuple[Hub, Person]:
     return ctx.request_context.lifespan_context.hub, person
 
 
-def told(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
+def with_error_messages(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
     """Wrap a tool or resource so that clients see the messages of `FormupError` and no others."""
 
     @wraps(work)
@@ -60,7 +60,7 @@ def told(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
     return telling
 
 
-async def theirs(ctx: Ctx, session: str) -> Session:
+async def own_session(ctx: Ctx, session: str) -> Session:
     """Return a session of the caller; the sessions of others count as missing.
 
     Raises:
@@ -75,15 +75,15 @@ async def theirs(ctx: Ctx, session: str) -> Session:
         raise InputError(f"There is no session {session!r}.", "missing") from None
 
 
-async def permitted(ctx: Ctx, session: str, scope: Scope = "read") -> tuple[Service, Person]:
+async def authorize(ctx: Ctx, session: str, scope: Scope = "read") -> tuple[Service, Person]:
     """Return the service and the caller, once they are known to have the scope and the session.
 
     Raises:
         InputError: they lack the scope (`not_allowed`), or have no such session (`missing`).
     """
     hub, person = caller(ctx)
-    need(person, scope)
-    await theirs(ctx, session)
+    require_scope(person, scope)
+    await own_session(ctx, session)
     return hub.service, person
 
 
@@ -105,7 +105,7 @@ async def picture_named(ctx: Ctx, image: str) -> Picture:
     if folders:
         return await asyncio.to_thread(lambda: load_picture(_inside(image, folders)))
     try:
-        return (await theirs(ctx, image)).picture
+        return (await own_session(ctx, image)).picture
     except InputError as error:
         if error.kind != "missing":
             raise

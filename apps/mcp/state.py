@@ -13,7 +13,7 @@ from ...agent.turns import Turn
 from ...tools.draw import draw_view
 from ...tools.errors import InputError
 from ...tools.world import World
-from .access import Ctx, caller, theirs
+from .access import Ctx, caller, own_session
 
 HEARTBEAT = 5.0
 """Seconds between progress reports while a turn goes on."""
@@ -43,10 +43,10 @@ class State(BaseModel):
     detail: dict[str, Any] | None = None
 
 
-Told = Annotated[CallToolResult, State]
+StateResult = Annotated[CallToolResult, State]
 
 
-async def followed(ctx: Ctx, turn: Turn) -> str:
+async def await_turn(ctx: Ctx, turn: Turn) -> str:
     """Wait for the end of a turn, `PATIENCE` seconds at most, reporting progress meanwhile.
 
     Returns:
@@ -73,15 +73,15 @@ async def followed(ctx: Ctx, turn: Turn) -> str:
     return ""
 
 
-async def after(
+async def state_after(
     ctx: Ctx, session: str, turn: Turn, *, detail: bool = False, picture: bool = False
 ) -> CallToolResult:
     """Wait for a turn, then return the session's state, even if the turn still goes on."""
-    before = await followed(ctx, turn)
-    return await standing(ctx, session, before, detail=detail, picture=picture)
+    before = await await_turn(ctx, turn)
+    return await session_state(ctx, session, before, detail=detail, picture=picture)
 
 
-async def standing(
+async def session_state(
     ctx: Ctx, session: str, before: str = "", *, detail: bool = False, picture: bool = False
 ) -> CallToolResult:
     """Return the session's current state.
@@ -89,7 +89,7 @@ async def standing(
     Args:
         before: text to put before its message.
     """
-    service, held = caller(ctx)[0].service, await theirs(ctx, session)
+    service, held = caller(ctx)[0].service, await own_session(ctx, session)
     now = service.turn(session)
     if now is not None or await asyncio.to_thread(service.is_written, session):
         driving = now is not None and now.moving.is_set()
@@ -136,7 +136,7 @@ def view(held: Session, plan_id: str | None = None) -> bytes:
         InputError: there is no such plan.
     """
     run = held.run
-    plan = None if plan_id is None else planned(held, plan_id).plan
+    plan = None if plan_id is None else plan_node(held, plan_id).plan
     if run is None:
         return draw_view(held.picture, World.of(held.picture))
     if plan is not None:
@@ -145,7 +145,7 @@ def view(held: Session, plan_id: str | None = None) -> bytes:
     return shown or draw_view(run.context.picture, run.world.having(targets=()))
 
 
-def planned(held: Session, plan_id: str) -> Any:
+def plan_node(held: Session, plan_id: str) -> Any:
     """Return a plan of a session as a node, with the plan that it was made from.
 
     Raises:

@@ -13,7 +13,7 @@ from ...agent.service import Service
 from ...tools.errors import FormupError
 from . import health, openai_chat, openai_responses, page, scenes, sessions, sharing, streams, turns
 from .guard import Guard
-from .hub import Hub, error_response, told
+from .hub import Hub, error_response, formup_error_response
 from .metrics import Metrics
 from .settings import ServerSettings
 from .tokens import Tokens
@@ -72,7 +72,7 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
 
 async def _formup_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, FormupError)
-    return told(error)
+    return formup_error_response(error)
 
 
 async def _invalid_request(request: Request, error: Exception) -> Response:

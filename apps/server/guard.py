@@ -11,7 +11,7 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...tools.errors import FormupError, InputError
-from .hub import Hub, error_response, told
+from .hub import Hub, error_response, formup_error_response
 from .tokens import Person
 
 OPEN = ("/health/", "/v1/pictures/", "/page/")
@@ -54,8 +54,8 @@ class Guard:
                 await send(message)
 
         try:
-            self._check_place(scope["method"], headers)
-            async with self._known(scope["method"], scope["path"], headers) as person:
+            self._check_origin(scope["method"], headers)
+            async with self._authenticated(scope["method"], scope["path"], headers) as person:
                 scope.setdefault("state", {})["person"] = person
                 counts = nullcontext() if _is_open(scope["path"]) else self._counted(person)
                 with counts:
@@ -66,7 +66,7 @@ class Guard:
             if begun:
                 raise
             refused.clear()
-            await told(error)(scope, receive, watched)
+            await formup_error_response(error)(scope, receive, watched)
         except _RefusedError as error:
             refused.clear()
             if begun:
@@ -78,7 +78,9 @@ class Guard:
             await response(scope, receive, watched)
 
     @asynccontextmanager
-    async def _known(self, method: str, path: str, headers: Headers) -> AsyncGenerator[Person]:
+    async def _authenticated(
+        self, method: str, path: str, headers: Headers
+    ) -> AsyncGenerator[Person]:
         """Yield who asks, and end their request if their token is revoked meanwhile."""
         loop, person = asyncio.get_running_loop(), self._person(path, headers)
         there = f"/api/sessions/{person.sees}"
@@ -105,7 +107,7 @@ class Guard:
         finally:
             looks.cancel()
 
-    def _check_place(self, method: str, headers: Headers) -> None:
+    def _check_origin(self, method: str, headers: Headers) -> None:
         """Refuse hosts that are not names of this server, and unsafe calls of other origins."""
         host, settings = headers.get("host", ""), self._hub.settings
         name = _parsed_address(f"//{host}").hostname or ""

@@ -65,7 +65,7 @@ AHub = Annotated[Hub, Depends(hub_of)]
 APerson = Annotated[Person, Depends(person_of)]
 
 
-def need(person: Person, scope: Scope) -> None:
+def require_scope(person: Person, scope: Scope) -> None:
     """Refuse a person who does not have a scope.
 
     Raises:
@@ -121,7 +121,7 @@ def error_response(status: int, message: str, code: str | None = None) -> JSONRe
     return JSONResponse(error_data(message, code, kind), status)
 
 
-def told(error: FormupError) -> JSONResponse:
+def formup_error_response(error: FormupError) -> JSONResponse:
     """Return the response to a `FormupError`; from status 500 on, it only points to the log."""
     by_kind = STATUS.get(error.kind)
     usual = (

@@ -9,7 +9,7 @@ import textwrap
 
 from pydantic_core import to_json
 
-from .openai_request import Said
+from .openai_request import ChatRequest
 
 TASK = re.compile(r"\w+_generation|function_calling")
 """The names that Open WebUI gives to chores, where it names them."""
@@ -52,32 +52,32 @@ NOTHING = (
 )
 
 
-def chore(said: Said) -> str | None:
+def chore(request: ChatRequest) -> str | None:
     """Return the answer to a chore; None if the message is a person's."""
-    text, system = said.last.text, said.system
-    told = text if _tells(text, None) else system if _tells(system, HEAD) else ""
-    if not told and not TASK.fullmatch(said.task):
+    text, system = request.last.text, request.system
+    prompt = text if _is_chore(text, None) else system if _is_chore(system, HEAD) else ""
+    if not prompt and not TASK.fullmatch(request.task):
         return None
-    asked = HISTORY.split(f"{said.task}\n{told or text}", maxsplit=1)[0]
+    asked = HISTORY.split(f"{request.task}\n{prompt or text}", maxsplit=1)[0]
     for pattern, name, value in KINDS:
         if re.search(pattern, asked, re.I):
             return to_json({name: value}).decode()
-    as_json = said.as_json or "json" in asked.lower()
+    as_json = request.as_json or "json" in asked.lower()
     if TITLE.search(asked):
-        title = _title(said)
+        title = _title(request)
         return to_json({"title": title, "language": "English"}).decode() if as_json else title
     if "emoji" in asked.lower():
         return "🤖"
     return "{}" if as_json else NOTHING
 
 
-def _tells(text: str, head: int | None) -> bool:
+def _is_chore(text: str, head: int | None) -> bool:
     """Return whether a text is a chore, by known wording or by all signs within its head."""
     return bool(KNOWN.match(text)) or all(sign.search(text[:head]) for sign in SIGNS)
 
 
-def _title(said: Said) -> str:
+def _title(request: ChatRequest) -> str:
     """Return a title made from the person's first message."""
-    quoted = SPOKEN.search(said.last.text)
-    first = quoted[1] if quoted else said.users[0].text if len(said.users) > 1 else ""
+    quoted = SPOKEN.search(request.last.text)
+    first = quoted[1] if quoted else request.users[0].text if len(request.users) > 1 else ""
     return textwrap.shorten(first, 50, placeholder="…") or "Robots"

@@ -15,7 +15,7 @@ from ...agent.store.protocol import Event, StoredSession, files_named
 from ...tools.errors import InputError, StorageError
 from .forms import SessionFacts
 from .hub import Hub, check_owner
-from .openai_request import Message, Place, Said, digest
+from .openai_request import ChatRequest, Message, Place, digest
 from .sessions import check_room, owned
 from .tokens import Person
 
@@ -28,7 +28,7 @@ MARK = 12
 
 
 @asynccontextmanager
-async def alone(hub: Hub, person: Person) -> AsyncGenerator[None]:
+async def person_lock(hub: Hub, person: Person) -> AsyncGenerator[None]:
     """Hold a person's lock, across all processes, so that no session is opened twice."""
     while (held := hub.service.store.lock(f"chats-{person.name}")) is None:
         await asyncio.sleep(0.02)
@@ -36,8 +36,8 @@ async def alone(hub: Hub, person: Person) -> AsyncGenerator[None]:
         yield
 
 
-async def find(
-    hub: Hub, person: Person, said: Said, *, here: bool = False
+async def find_session(
+    hub: Hub, person: Person, request: ChatRequest, *, here: bool = False
 ) -> tuple[str, str | None] | None:
     """Return the session to go on in and the key of the turn; None if no session has begun.
 
@@ -47,29 +47,33 @@ async def find(
     Raises:
         InputError: they have no such session, or no room for a fork.
     """
-    place = said.place or await _remembered(hub, person, said)
+    place = request.place or await _remembered(hub, person, request)
     if place is None:
         return None
     events = await _events(hub, check_owner(place.session, person))
-    key = None if len(said.users) == 1 else digest(said.who, *said.users)
+    key = None if len(request.users) == 1 else digest(request.who, *request.users)
     if place.turn == 0:
         return place.session, key
-    if said.place is not None:
-        for message in said.since[:-1]:  # messages whose answers the client lost
-            place, events = await _answered(hub, person, place, message, events)
-        key = _key(place, said.last)
+    if request.place is not None:
+        for message in request.since[:-1]:  # messages whose answers the client lost
+            place, events = await _follow_up(hub, person, place, message, events)
+        key = _key(place, request.last)
     assert key is not None, "a history that is remembered has more than one message"
-    return place.session if here else await _in_session(hub, person, said, place, key, events), key
+    return place.session if here else await _in_session(
+        hub, person, request, place, key, events
+    ), key
 
 
-def name_of(said: Said, key: str) -> str:
+def name_of(request: ChatRequest, key: str) -> str:
     """Return the name of a session, with marks by which it is found again."""
-    words = next((m.text for m in said.users if m.text), "")
+    words = next((m.text for m in request.users if m.text), "")
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
-    return " ".join([line[:60], f"[{key[:MARK]}]", *([_chat_mark(said)] if said.chat else [])])
+    return " ".join(
+        [line[:60], f"[{key[:MARK]}]", *([_chat_mark(request)] if request.chat else [])]
+    )
 
 
-async def begun_before(hub: Hub, person: Person, key: str) -> str | None:
+async def recently_opened(hub: Hub, person: Person, key: str) -> str | None:
     """Return the session that the same first message opened within `SAME`, or None."""
     found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
     since = (datetime.now(UTC) - SAME).isoformat()
@@ -92,23 +96,23 @@ async def run_at(hub: Hub, place: Place) -> Run:
     return await asyncio.to_thread(load_run, _Until(stored, place.turn))
 
 
-async def _remembered(hub: Hub, person: Person, said: Said) -> Place | None:
+async def _remembered(hub: Hub, person: Person, request: ChatRequest) -> Place | None:
     """Return the place where a history without our messages goes on; turn 0 for a session's end."""
-    keys = [digest(said.who, *said.users[:n]) for n in range(len(said.users) - 1, 0, -1)]
+    keys = [digest(request.who, *request.users[:n]) for n in range(len(request.users) - 1, 0, -1)]
     marks = [f"[{key[:MARK]}]" for key in keys]
-    chat = _chat_mark(said) if said.chat else None
+    chat = _chat_mark(request) if request.chat else None
     listed = await asyncio.to_thread(_marked, hub, person, *marks, *([chat] if chat else []))
     for facts in listed:
         turns = _turns(await _events(hub, facts.id))
         if number := next((turns[key] for key in keys if key in turns), None):
             return Place(facts.id, number)
-    if said.last.pictures and not keys:
+    if request.last.pictures and not keys:
         return None  # another chat may begin with the same message
     return next((Place(f.id, 0) for f in listed if chat and chat in f.name), None)
 
 
 async def _in_session(
-    hub: Hub, person: Person, said: Said, place: Place, key: str, events: Sequence[Event]
+    hub: Hub, person: Person, request: ChatRequest, place: Place, key: str, events: Sequence[Event]
 ) -> str:
     """Return a session in which nothing but this request follows the turn, forking if need be."""
     later = [e for e in events[place.turn :] if e.kind in STAMPED]
@@ -119,10 +123,10 @@ async def _in_session(
     await asyncio.to_thread(check_room, hub, person)
     kept, store = _until(events, place.turn), hub.service.store
     files = files_named(kept, store.open(place.session).artefacts)
-    return store.create(name_of(said, key), kept, files, person.name).id
+    return store.create(name_of(request, key), kept, files, person.name).id
 
 
-async def _answered(
+async def _follow_up(
     hub: Hub, person: Person, place: Place, message: Message, events: Sequence[Event]
 ) -> tuple[Place, Sequence[Event]]:
     """Return the place of the turn that a message began, and its events; if none, those given."""
@@ -165,8 +169,8 @@ def _marked(hub: Hub, person: Person, *marks: str) -> list[SessionFacts]:
     return [facts for facts in found if any(mark in facts.name for mark in marks)]
 
 
-def _chat_mark(said: Said) -> str:
-    return f"[{digest('chat', said.who, said.chat)[:MARK]}]"
+def _chat_mark(request: ChatRequest) -> str:
+    return f"[{digest('chat', request.who, request.chat)[:MARK]}]"
 
 
 def _key(place: Place, message: Message) -> str:

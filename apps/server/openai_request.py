@@ -112,8 +112,8 @@ class ResponsesBody(Body):
 
 
 @dataclass(frozen=True)
-class Said:
-    """What a person said, and where in which conversation.
+class ChatRequest:
+    """The request of a chat client: what the person said, and where in which conversation.
 
     Attributes:
         model: name of the model that is to decide.
@@ -143,7 +143,7 @@ class Said:
         return self.users[-1]
 
 
-def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
+def parse_request(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> ChatRequest:
     """Return what a request says.
 
     Raises:
@@ -163,7 +163,7 @@ def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
         raise InputError("The request holds no message of role user; give what the person says.")
     facts = {k: str(v) for k, v in (body.metadata or {}).items()}
     chat = facts.get("chat_id") or facts.get("conversation_id")
-    return Said(
+    return ChatRequest(
         model=body.model,
         users=users,
         since=tuple(m for m in messages[after:] if m.role == "user"),

@@ -10,10 +10,10 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from ...tools.errors import InputError
 from .hub import AHub, APerson, check_owner
-from .openai_answers import USUAL, Answer, Begun, awaited, base_of, begin, problem, told
+from .openai_answers import USUAL, Answer, Begun, answer_of, base_of, begin, final_answer, problem
 from .openai_chat import STREAM, frame
 from .openai_places import run_at
-from .openai_request import ResponsesBody, place_of, said_in
+from .openai_request import ResponsesBody, parse_request, place_of
 from .sessions import ERRORS
 
 router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
@@ -22,12 +22,12 @@ router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
 @router.post("/responses")
 async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APerson) -> Response:
     """Answer what the person says."""
-    said = said_in(body, request.headers)
-    begun = await begin(hub, person, said, base_of(request, hub))
+    asked = parse_request(body, request.headers)
+    begun = await begin(hub, person, asked, base_of(request, hub))
     facts = _response(begun, body.model) | {"previous_response_id": body.previous_response_id}
     if body.stream:
         return StreamingResponse(_events(begun, facts), 200, STREAM, "text/event-stream")
-    return JSONResponse(_completed(await awaited(begun), facts))
+    return JSONResponse(_completed(await final_answer(begun), facts))
 
 
 @router.get("/responses/{response}")
@@ -39,7 +39,7 @@ async def again(response: str, request: Request, hub: AHub, person: APerson) -> 
     if place is None:
         raise InputError(f"The response {response!r} was not kept.", "missing")
     check_owner(place.session, person)
-    answer = await told(place, await run_at(hub, place), base_of(request, hub))
+    answer = await answer_of(place, await run_at(hub, place), base_of(request, hub))
     return JSONResponse(_completed(answer, _response(answer, USUAL)))
 
 
@@ -58,7 +58,7 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
     yield event("response.in_progress", response=facts)
     answer = None
     try:
-        async for answer in begun.told():
+        async for answer in begun.answers():
             if answer is None:
                 yield b": at it\n\n"
     except Exception as error:

@@ -15,7 +15,7 @@ from ...tools.draw import draw_plan
 from ...tools.errors import InputError
 from ...tools.perception.image import Picture, picture_from_bytes
 from .forms import AgentFacts, Error, Fork, Name, SessionFacts, SessionState, TurnState, Waits
-from .hub import AHub, APerson, Hub, check_owner, check_seen, need
+from .hub import AHub, APerson, Hub, check_owner, check_seen, require_scope
 from .tokens import Person
 
 ERRORS: dict[int | str, dict[str, Any]] = {
@@ -91,7 +91,7 @@ async def begin(
     seed: Annotated[int, Query(ge=0, le=2**31)] = 0,
 ) -> SessionState:
     """Begin a session about the picture that is the body."""
-    need(person, "plan")
+    require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     picture = await picture_sent(request, hub, name or "picture")
     settings = hub.settings.of_session(
@@ -175,7 +175,7 @@ async def state_of(hub: Hub, session: str) -> SessionState:
 @router.patch("/sessions/{session}")
 async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionState:
     """Call a session otherwise."""
-    need(person, "plan")
+    require_scope(person, "plan")
     mine = check_owner(session, person)
     await asyncio.to_thread(hub.service.store.rename, mine, to.name)
     return await state_of(hub, session)
@@ -184,14 +184,14 @@ async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionS
 @router.delete("/sessions/{session}", status_code=204)
 async def delete(session: str, hub: AHub, person: APerson) -> None:
     """Hold its robots, and delete a session with all that was said in it."""
-    need(person, "plan")
+    require_scope(person, "plan")
     await hub.service.delete(check_owner(session, person))
 
 
 @router.post("/sessions/{session}/forks", status_code=201)
 async def fork(session: str, at: Fork, hub: AHub, person: APerson) -> SessionState:
     """A session of its own that begins as this one did."""
-    need(person, "plan")
+    require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     mine = check_owner(session, person)
     return await state_of(hub, await asyncio.to_thread(hub.service.fork, mine, at.turn))

@@ -14,7 +14,7 @@ from ...agent.store.protocol import Event
 from ...agent.turns import Asked, Turn
 from ...tools.errors import InputError
 from .forms import Approval, Deployment, Edits, Key, Message, TurnState, Undo
-from .hub import AHub, APerson, Hub, asked_by, check_owner, check_seen, need
+from .hub import AHub, APerson, Hub, asked_by, check_owner, check_seen, require_scope
 from .sessions import ERRORS, PICTURE, picture_sent
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["turns"], responses=ERRORS)
@@ -44,7 +44,7 @@ def asking(
     session: str, hub: AHub, person: APerson, response: Response, key: AKey = None, wait: Wait = 30
 ) -> Asking:
     """Return who asks, once it is known that they may plan in that session."""
-    need(person, "plan")
+    require_scope(person, "plan")
     return Asking(hub, check_owner(session, person), asked_by(person, key), wait, response)
 
 
@@ -90,7 +90,7 @@ async def deploy(
     key: Annotated[Key, Header(alias="Idempotency-Key")],
 ) -> TurnState:
     """Drive the robots to a plan: a job, done once for a key. Real ones wait for an approval."""
-    need(person, "move")
+    require_scope(person, "move")
     asked, name = asked_by(person, key), check_owner(session, person)
     run = (await hub.service.fresh(name)).run
     known = run is not None and wanted.plan_id in run.world.plans
@@ -107,7 +107,7 @@ async def approve(
     session: str, given: Approval, hub: AHub, person: APerson, response: Response
 ) -> TurnState:
     """Say yes to exactly the plan that waits; real robots then drive to it."""
-    need(person, "move")
+    require_scope(person, "move")
     asked = asked_by(person)
     name = await check_seen(hub, session, person)
     turn = hub.service.approve(name, given.plan_id, given.nonce, asked=asked)
