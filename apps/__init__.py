@@ -1,1 +1,1 @@
-"""How people reach formup; everything is used here and nothing uses this."""
+"""The interfaces through which people use formup: the top layer, which no other imports."""

@@ -1,4 +1,4 @@
-"""The agent that options choose, with its spans sent where the environment says."""
+"""The agent that command-line options choose; its spans go where the environment says."""
 
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
@@ -33,10 +33,10 @@ def agent_of(
     talks: bool = False,
     show_text: ShowText | None = None,
 ) -> Generator[Agent, None, None]:
-    """The agent that was chosen; the offline planner goes without a prompt.
+    """Yield the agent that the options choose; the offline planner gets no prompt.
 
     Args:
-        talks: whether by default a language model is given the prompt for conversations.
+        talks: whether a language model gets the prompt for conversations by default.
         show_text: see `Agent`.
     """
     if talks and prompt is None and planner is None and model != "offline":
@@ -66,7 +66,7 @@ def agent_of(
 
 @contextmanager
 def tracer_of_environment() -> "Generator[Tracer | None, None, None]":
-    """For spans, if the environment asks for them; a run does not fail for the want of one."""
+    """Yield the tracer that the environment asks for, if any; if it fails, say so, yield None."""
     with ExitStack() as stack:
         tracer = None
         try:

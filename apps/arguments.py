@@ -1,4 +1,4 @@
-"""Command-line words to values; each mistake is one sentence with the value and what is allowed."""
+"""Parsing of command-line words; each error is one sentence: the value and what is allowed."""
 
 import math
 import re
@@ -27,10 +27,10 @@ Things = tuple[TargetPrompt, ...]
 
 
 def robots(text: str | None) -> int | None:
-    """A number of robots.
+    """Parse a number of robots.
 
     Raises:
-        InputError: not a whole number from 1 to 10,000.
+        InputError: the text is not a whole number from 1 to 10,000.
     """
     if text is None:
         return None
@@ -38,10 +38,10 @@ def robots(text: str | None) -> int | None:
 
 
 def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
-    """A whole number in a range.
+    """Parse a whole number in a range, such as 12000 or 12,000.
 
     Raises:
-        InputError: not such a number.
+        InputError: the text is not such a number.
     """
     plain = re.fullmatch(r"[0-9]{1,9}|[0-9]{1,3}(,[0-9]{3})+", text.strip())
     value = int(plain[0].replace(",", "")) if plain else least - 1
@@ -53,10 +53,10 @@ def whole(name: str, text: str, *, least: int, most: int = 1_000_000) -> int:
 
 
 def scale(text: str | None) -> float | None:
-    """Metres per pixel.
+    """Parse a scale in metres per pixel.
 
     Raises:
-        InputError: not a number, or no scale that a picture has.
+        InputError: the text is not a number, or outside the range of plausible scales.
     """
     form = f"a number from {FINEST:f} to {COARSEST:g}, such as 0.05"
     return _number_where(lambda v: FINEST <= v <= COARSEST, "--metres-per-pixel", text, form)
@@ -71,13 +71,13 @@ def numbers(
     seed: str,
     picture: Picture | None,
 ) -> dict[str, Any]:
-    """Robots, scale, the robots' radius, clearance, threshold and seed, as of Settings.
+    """Parse robots, scale, the robots' radius, clearance, threshold and seed, for `Settings`.
 
     Args:
-        picture: whose file may say its scale.
+        picture: its file may state its scale, which metric lengths use if none is given.
 
     Raises:
-        InputError: one of them is none, or not in its range.
+        InputError: one of them is not a number, or not in its range.
     """
     given = scale(scale_text)
     known = picture.metres_per_pixel if picture is not None and given is None else given
@@ -92,10 +92,10 @@ def numbers(
 
 
 def length(name: str, text: str | None, metres_per_pixel: float | None) -> float | None:
-    """A length in pixels, 0 or more, from pixels or, with a unit behind them, m, cm or mm.
+    """Parse a length, in pixels or with a unit such as m, cm or mm; return pixels, 0 or more.
 
     Raises:
-        InputError: not such a number, or a metric one in a picture without a scale.
+        InputError: the text is not a length, or is metric in a picture without a scale.
     """
     if text is None:
         return None
@@ -111,7 +111,7 @@ def length(name: str, text: str | None, metres_per_pixel: float | None) -> float
 
 
 def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | None:
-    """A length with its unit, px; None where it is none."""
+    """Return in pixels a length given with its unit; None if the text is not one."""
     found = quantities_in(text.strip())
     if len(found) != 1 or found[0].wording != text.strip() or not found[0].is_length:
         return None
@@ -127,22 +127,22 @@ def _metric(name: str, text: str, metres_per_pixel: float | None) -> float | Non
 
 
 def share(name: str, text: str | None) -> float | None:
-    """A number from 0 to 1.
+    """Parse a number from 0 to 1.
 
     Raises:
-        InputError: not such a number.
+        InputError: the text is not such a number.
     """
     return _number_where(lambda v: 0 <= v <= 1, name, text, "a number from 0 to 1")
 
 
 def rates(name: str, texts: list[str] | None, models: Sequence[str]) -> dict[str, float]:
-    """Numbers above 0 by model, from MODEL=N.
+    """Parse texts MODEL=N; return each N, above 0, by model.
 
     Args:
-        models: those there are.
+        models: the models of this run.
 
     Raises:
-        InputError: not of that form, or of another model.
+        InputError: a text is not of that form, or names another model.
     """
     found: dict[str, float] = {}
     for text in texts or []:
@@ -159,10 +159,10 @@ def rates(name: str, texts: list[str] | None, models: Sequence[str]) -> dict[str
 
 
 def dollars(name: str, text: str | None) -> float | None:
-    """An amount of money in US dollars.
+    """Parse an amount of money in US dollars.
 
     Raises:
-        InputError: not a number above 0.
+        InputError: the text is not a number above 0 and up to a million.
     """
     return _number_where(
         lambda v: 0 < v <= 1_000_000, name, text, "US dollars above 0, such as 2.50"
@@ -170,10 +170,10 @@ def dollars(name: str, text: str | None) -> float | None:
 
 
 def descriptor(text: str) -> Descriptor:
-    """How shapes are put into text.
+    """Parse the way in which shapes are described in text.
 
     Raises:
-        InputError: not one of the three.
+        InputError: the text is not one of the three.
     """
     for known in get_args(Descriptor):
         if text == known:
@@ -188,13 +188,15 @@ def pointed(
     candidates: list[str] | None,
     option: str | None = None,
 ) -> tuple[TargetPrompt, ...]:
-    """What was pointed at, as t1, t2, ...: points, then boxes, then outlines, then candidates.
+    """Parse what was pointed at, as t1, t2, ...: points, boxes, outlines, then candidates.
 
     Args:
-        option: that all of them were given with, where it is one for all.
+        option: the one option that all of them were given with, for errors; None if each kind
+            has its own.
 
     Raises:
-        InputError: not numbers, not as many as are needed, or no id of a candidate.
+        InputError: a part is not a number, there are too few or too many numbers, or a
+            candidate's id is malformed.
     """
     found: list[dict[str, object]] = []
     for text in points or []:
@@ -229,13 +231,13 @@ def pointed(
 def shown(
     ways: Sequence[list[str] | None], files: Sequence[Path] | None, picture: Picture | None
 ) -> list[Things]:
-    """What was pointed at, then the things of mask files, those of one file together.
+    """Return groups of things: one for each prompt of `pointed`, then one for each mask file.
 
     Args:
         ways: points, boxes, outlines and candidates.
 
     Raises:
-        InputError: as `pointed`; or a file cannot be read, or does not fit the picture.
+        InputError: as `pointed`; or a file has no picture, cannot be read or does not fit it.
     """
     if files and picture is None:
         raise InputError("--mask needs the picture that it is of; name that too.")
@@ -249,16 +251,16 @@ def shown(
 
 
 def numbered(groups: Iterable[Things]) -> Things:
-    """Things as t1, t2, ..."""
+    """Flatten groups of things and number them t1, t2, ..."""
     things = (thing for group in groups for thing in group)
     return tuple(t.model_copy(update={"id": f"t{i}"}) for i, t in enumerate(things, start=1))
 
 
-def kept_out(texts: list[str] | None) -> tuple[TargetPrompt, ...]:
-    """What no robot may enter: a point, a box, an outline or a candidate, by how many numbers.
+def keep_out_things(texts: list[str] | None) -> tuple[TargetPrompt, ...]:
+    """Parse what no robot may enter; the count of numbers tells point, box, outline, candidate.
 
     Raises:
-        InputError: it is none of these.
+        InputError: a text is none of these.
     """
     ways: tuple[list[str], ...] = ([], [], [], [])
     for text in texts or []:
@@ -267,10 +269,10 @@ def kept_out(texts: list[str] | None) -> tuple[TargetPrompt, ...]:
 
 
 def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> Limits:
-    """Limits from NAME=VALUE, over those there were before.
+    """Parse limits NAME=VALUE, which override those before.
 
     Raises:
-        InputError: no such limit, or no number above 0.
+        InputError: there is no such limit, or the value is not allowed for it.
     """
     names = [field.name for field in fields(Limits)]
     found: dict[str, Any] = dict(before or {})
@@ -289,10 +291,10 @@ def limits(given: list[str] | None, before: Mapping[str, Any] | None = None) -> 
 
 
 def policy(given: list[str] | None, before: Sequence[Sequence[str]] = ()) -> Policy:
-    """A policy from GLOB=DECISION, these rules before those there were.
+    """Parse a policy from rules GLOB=DECISION, which come ahead of those before.
 
     Raises:
-        InputError: no such rule.
+        InputError: a text is not such a rule.
     """
     for text in given or []:
         if not re.fullmatch("[^=]+=(allow|ask|refuse)", text):
@@ -305,10 +307,10 @@ def policy(given: list[str] | None, before: Sequence[Sequence[str]] = ()) -> Pol
 
 
 def variables(given: list[str] | None, declared: Mapping[str, Input]) -> dict[str, object]:
-    """Values for the inputs of a prompt from NAME=VALUE; whether they will do is for it to say.
+    """Parse values NAME=VALUE for the inputs of a prompt, which itself checks them later.
 
     Raises:
-        InputError: no NAME=VALUE, or a name given twice.
+        InputError: a text is not NAME=VALUE, or a name is given twice.
     """
     found: dict[str, object] = {}
     for text in given or []:
@@ -321,10 +323,10 @@ def variables(given: list[str] | None, declared: Mapping[str, Input]) -> dict[st
 
 
 def scores(path: Path | None) -> dict[str, dict[str, float]]:
-    """Scores of prompts by suite, from JSON; none without a file.
+    """Read scores by prompt and suite from a JSON file; return none if there is no file.
 
     Raises:
-        InputError: it cannot be read, or is something else.
+        InputError: the file cannot be read, or is not of that form.
     """
     if path is None:
         return {}
@@ -336,10 +338,10 @@ def scores(path: Path | None) -> dict[str, dict[str, float]]:
 
 
 def recording(path: Path | None) -> Path | None:
-    """Where a recording goes; that it can is found out before the run.
+    """Check, ahead of the run, that a recording can be written to a path, and return the path.
 
     Raises:
-        InputError: there is no such folder, or a folder lies there.
+        InputError: its folder does not exist, or the path is itself a folder.
     """
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
         raise InputError(
@@ -360,7 +362,7 @@ def _candidate(text: str, option: str) -> str:
 def _number_where(
     allowed: Callable[[float], bool], name: str, text: str | None, form: str
 ) -> float | None:
-    """A number that is allowed; `form` says what would be."""
+    """Parse a number and check that it is allowed; `form` tells the error what is."""
     value = None if text is None else _number(text)
     if text is not None and (value is None or not allowed(value)):
         raise InputError(f"{name} {text!r} cannot be used; give {form}.")

@@ -35,14 +35,14 @@ from .terminal_picture import way_of_terminal
 from .window import watching
 
 POINTING = ("--point", "--box", "--outline", "--target", "--mask")
-"""Options that point, in the order in which `chat` reads them."""
+"""Options that point at things, in the order in which `chat` reads them."""
 
 
 class InOrder(TyperCommand):
-    """Keeps the words of the command line, so that things are t1, t2, ... in the order given."""
+    """A command that stores its raw arguments, so that things are t1, t2, ... in their order."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the command line."""
+        """Store the arguments, then parse them as usual."""
         ctx.meta["words"] = list(args)
         return super().parse_args(ctx, args)
 
@@ -91,7 +91,7 @@ def chat(
     picture = picture_given(ctx.params)
     settings = settings_given(ctx.params, picture)
     things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
-    begin = Beginning(picture, session, things, arguments.kept_out(keep_out), settings)
+    begin = Beginning(picture, session, things, arguments.keep_out_things(keep_out), settings)
     rules, (lines, display) = _rules(policy, auto, plan_only), _front(script, as_json, plain)
     chosen = partial(_agent, (planner, base_url, prompt, prompts, limit, rules), display, lines)
     with chosen(model) as agent, Folder(out) as home, watching(watch, stays=False) as services:
@@ -102,14 +102,14 @@ def chat(
 def _agent(
     rest: Any, display: Display | None, lines: Iterator[str] | None, model: str
 ) -> AbstractContextManager[Agent]:
-    """The agent with a model, whose replies a person who types sees while they come."""
+    """Return the agent with a model; its replies are shown as they stream to a person who types."""
     told = display.fragment if display is not None and lines is None else None
     return agent_of(model, *rest, talks=True, show_text=told)
 
 
 @dataclass(frozen=True)
 class Beginning:
-    """What a chat begins with: a picture and what was said of it, or a stored session."""
+    """What a chat begins with: a picture and things pointed at in it, or a stored session."""
 
     picture: Picture | None
     session: str | None
@@ -118,10 +118,10 @@ class Beginning:
     settings: Settings
 
     def open(self, service: Service) -> str:
-        """The session.
+        """Open a new session or reopen the stored one, and return its id.
 
         Raises:
-            InputError: nothing to begin with, or it cannot be used.
+            InputError: there is neither a picture nor a session, or it cannot be used.
         """
         picture = self.picture
         if self.session is not None:
@@ -130,7 +130,7 @@ class Beginning:
             return self.session
         if picture is None:
             raise InputError("Name a picture to talk about, or a session to go on with.")
-        Context.of(picture, self.settings)  # what cannot be is said before anything is kept
+        Context.of(picture, self.settings)  # raises before anything is stored
         return service.open(
             picture, settings=self.settings, pointed=self.pointed, keep_out=self.keep_out
         )
@@ -144,7 +144,7 @@ async def _serve(
     *,
     plain: bool,
 ) -> int:
-    """Open the session and talk; what to exit with."""
+    """Open the session, hold the chat, and return the exit code."""
     service = talk.service
     talk.session = begin.open(service)
     try:
@@ -170,7 +170,10 @@ async def _serve(
 def _front(
     script: Path | None, as_json: bool, plain: bool
 ) -> tuple[Iterator[str] | None, Display | None]:
-    """What is said by a program, and what shows the chat, in pictures too or in text alone."""
+    """Return the lines of a script or program, None if a person types, and the chat's display.
+
+    The display is None for JSON; it shows pictures unless the chat is plain or scripted.
+    """
     lines = _lines(script, as_json)
     if as_json:
         return lines, None
@@ -179,7 +182,7 @@ def _front(
 
 
 def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
-    """What is said by a file or a program; None where a person types.
+    """Return the lines of a script file or of stdin; None if a person types.
 
     Raises:
         InputError: the file cannot be read, or a person types and JSON is wanted.
@@ -194,10 +197,10 @@ def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
 
 
 def _rules(policy: list[str] | None, auto: bool, plan_only: bool) -> list[str]:
-    """The policy's rules, the first of which forbids to move where that is wanted.
+    """Return the policy's rules; with `plan_only`, the first one forbids moving robots.
 
     Raises:
-        InputError: robots are to move at once as well.
+        InputError: both `auto` and `plan_only` are set.
     """
     if auto and plan_only:
         raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
@@ -205,7 +208,7 @@ def _rules(policy: list[str] | None, auto: bool, plan_only: bool) -> list[str]:
 
 
 def _in_order(ctx: typer.Context, things: Sequence[Things]) -> Things:
-    """What each option gave, listed by kind, as t1, t2, ... in the order of the command line."""
+    """Number things, given by kind of option, t1, t2, ... in the order of the command line."""
     words: list[str] = [word.partition("=")[0] for word in ctx.meta["words"]]
     kinds = [POINTING.index(word) for word in words if word in POINTING]
     places = sorted(range(len(kinds)), key=lambda i: kinds[i])

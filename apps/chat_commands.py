@@ -1,4 +1,4 @@
-"""The slash commands of a chat: handed to the service, or answered from the state there is."""
+"""The slash commands of a chat: passed to the service, or answered from the current state."""
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 NO_PLAN = "There is no plan yet; say what the robots shall do."
 Done = Run | str | None
-"""What a command did, what it tells, or None where the chat is over."""
+"""The result of a command: the run it made, a text to show, or None to end the chat."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +32,8 @@ class Command:
     """A slash command.
 
     Attributes:
-        takes: what may follow it, for the help.
-        draws: whether what it tells is drawn too.
+        takes: what may follow it, as the help shows it.
+        draws: whether a picture goes with its text.
     """
 
     takes: str
@@ -43,10 +43,10 @@ class Command:
 
 
 def command_named(line: str) -> Command:
-    """The command that a line names, or the one it is an unambiguous beginning of.
+    """Return the command that a line begins with, in full or as an unambiguous prefix.
 
     Raises:
-        InputError: there is none, or several.
+        InputError: no command matches, or several do.
     """
     name = line.split(maxsplit=1)[0][1:].lower()
     found = [name] if name in COMMANDS else [c for c in COMMANDS if name and c.startswith(name)]

@@ -1,4 +1,4 @@
-"""What a turn of a chat shows: a line for each step of a tool, what came of it, the picture."""
+"""The display of a chat's turns: a line for each tool step, the result, and the picture."""
 
 import time
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from .terminal import say, styled, under
 from .terminal_picture import Way, show_picture
 
 COLUMN = 14
-"""Where texts begin."""
+"""The column at which texts begin, behind their names."""
 NAMED = "{:>12}  "
 
 
@@ -24,24 +24,24 @@ class Display:
     """Shows turns as they go.
 
     Args:
-        console: for a person who sees; None for nothing but lines of text.
-        way: how pictures are shown beside their files.
+        console: for styled output; None for plain lines of text alone.
+        way: how pictures are shown, besides naming their files.
     """
 
     def __init__(self, console: Console | None, way: Way) -> None:
         self._console = console
         self._way: Way = way
         self._last = 0.0
-        self._told, self._open = "", False  # of a reply that comes; whether its line goes on
+        self._streamed, self._open = "", False  # the reply shown so far; is its line open
 
     def fragment(self, text: str | None) -> None:
-        """More of a reply's text as it comes; None: what was shown of it is void."""
+        """Show more of a reply's text as it streams; None voids what was shown of it."""
         if text is None:
-            if self._told:
+            if self._streamed:
                 self.line("note", "The reply broke off; it begins anew.")
-            self._told = ""
+            self._streamed = ""
             return
-        begins = not self._told
+        begins = not self._streamed
         text = text.lstrip() if begins else text
         if not text:
             return
@@ -50,30 +50,30 @@ class Display:
         else:
             name = (NAMED.format("formup") if begins else "", "cyan")
             self._console.print(styled(name, under(text, COLUMN)), end="", soft_wrap=True)
-        self._told, self._open = self._told + text, True
+        self._streamed, self._open = self._streamed + text, True
 
     def step(self, message: Message) -> None:
-        """A message of a turn as it comes."""
+        """Show a message of a turn as it comes."""
         now, since = time.monotonic(), self._last
         self._last = now
         if isinstance(message, Reply) and not message.calls:
-            return  # `show` has what it says
-        told, self._told = self._told, ""
-        if isinstance(message, Reply) and message.text.strip() and not told:
+            return  # `show` prints its text
+        streamed, self._streamed = self._streamed, ""
+        if isinstance(message, Reply) and message.text.strip() and not streamed:
             self.line("formup", message.text)
         elif isinstance(message, Result) and message.name != "ask_user":
             failed = f" ({message.error})" if message.error else ""
             self.line("step", f"{message.name}, {now - since:.2f} s{failed}")
 
     def show(self, shown: Shown, folder: Path) -> None:
-        """What came of a line, with its files in that folder."""
+        """Show the result of a line, whose files are in the folder."""
         report = shown.report
-        told, self._told = self._told.rstrip(), ""
-        rest = report.message.strip().removeprefix(told).lstrip()
+        streamed, self._streamed = self._streamed.rstrip(), ""
+        rest = report.message.strip().removeprefix(streamed).lstrip()
         self._end_line()
         status = "" if report.status == "answered" else report.status
         head = f"{status}: " if status and rest else status
-        if told and not (head or rest):
+        if streamed and not (head or rest):
             return
         if self._console is None:
             say(f"formup: {head}{rest}")
@@ -91,7 +91,7 @@ class Display:
             self.line("film", str(folder / film))
 
     def line(self, name: str, text: str) -> None:
-        """A text with its name before it."""
+        """Print a text behind its name."""
         self._end_line()
         if self._console is None:
             say(f"{name}: {text}")
@@ -121,7 +121,11 @@ class Display:
 
 
 def _names(report: Report, size: tuple[int, int]) -> dict[str, tuple[float, float]]:
-    """The numbers of a question's choices in their middles, else the robots' at their places."""
+    """Return labels and where they go, as fractions of the picture's width and height.
+
+    The labels are the numbers of a question's choices, at the centres of their boxes, or else
+    the robots' names, at their places.
+    """
     places: dict[str, Sequence[float]] = dict(
         zip(report.robots or (), report.positions or (), strict=False)
     )

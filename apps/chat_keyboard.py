@@ -1,6 +1,6 @@
-"""What a person types in a chat with the terminal in its ordinary mode: plainly, or during a turn.
+"""Keyboard input of a chat with the terminal in its ordinary mode: plain, or during a turn.
 
-Lines that come together, as a paste does, are one message.
+Lines that arrive together, as in a paste, make one message.
 """
 
 import asyncio
@@ -15,12 +15,12 @@ from typing import Any
 from .terminal import say
 
 TOGETHER = 0.05
-"""Seconds within which lines come together."""
+"""Seconds of silence that end a message; lines with shorter gaps belong together."""
 PROMPT = "you: "
 
 
 class Typed:
-    """Messages typed at a terminal in its ordinary mode, with no prompt of ours open."""
+    """A queue of messages typed at a terminal in its ordinary mode, with no prompt of ours open."""
 
     def __init__(self) -> None:
         self._messages: deque[str] = deque()
@@ -29,10 +29,10 @@ class Typed:
         self._quiet: asyncio.TimerHandle | None = None
 
     def take(self) -> str | None:
-        """The next message that is there already.
+        """Return the next message already typed; None if there is none yet.
 
         Raises:
-            EOFError: there will be none.
+            EOFError: the input has ended and there will be none.
         """
         if self._messages:
             return self._messages.popleft()
@@ -45,10 +45,11 @@ class Typed:
         """Read what is typed meanwhile.
 
         Args:
-            handles: is given each line at once; one that it handles is in no message.
+            handles: called with each line at once; a line for which it returns true is left out
+                of the messages.
 
-        Returns:
-            What is set when a message is there, or there will be none.
+        Yields:
+            An event, set when a message is there or the input has ended.
         """
         loop, keyboard, there = asyncio.get_running_loop(), sys.stdin.fileno(), asyncio.Event()
 
@@ -72,7 +73,7 @@ class Typed:
 
         try:
             loop.add_reader(keyboard, read)
-        except (NotImplementedError, OSError):  # such as on Windows: it is read at the next prompt
+        except (NotImplementedError, OSError):  # as on Windows: read at the next prompt instead
             yield there
             return
         try:
@@ -85,11 +86,11 @@ class Typed:
 
 
 async def ask_plainly(typed: Typed) -> str:
-    """The next message, read as the terminal edits it.
+    """Ask for the next message, with the terminal's own line editing.
 
     Raises:
-        EOFError: there will be none.
-        KeyboardInterrupt: Ctrl-C.
+        EOFError: the input has ended.
+        KeyboardInterrupt: Ctrl-C was pressed.
     """
     say(PROMPT, end="")
     with typed.listening(lambda _: False) as there, interrupts_to(there.set) as interrupted:
@@ -103,7 +104,7 @@ async def ask_plainly(typed: Typed) -> str:
 
 
 def lines_piped() -> Iterator[str]:
-    """Lines as a program writes them; Ctrl-C ends the wait for one."""
+    """Yield lines of stdin as a program writes them; Ctrl-C ends the wait for one."""
     while True:
         before = signal.signal(signal.SIGINT, signal.default_int_handler)
         try:
@@ -117,7 +118,7 @@ def lines_piped() -> Iterator[str]:
 
 @contextmanager
 def interrupts_to(act: Callable[[], Any]) -> Generator[list[bool], None, None]:
-    """Have Ctrl-C call that in the event loop instead; the list gets an item each time."""
+    """Have Ctrl-C call `act` in the event loop; yield a list that grows by an item each time."""
     loop, hits = asyncio.get_running_loop(), list[bool]()
 
     def hit(*_: object) -> None:

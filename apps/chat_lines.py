@@ -1,6 +1,6 @@
-"""One line of a chat, said or commanded: the service does it, files are written, a report is made.
+"""One line of a chat, words or a command: the service acts, files are written, a report is made.
 
-Whatever shows a chat, to a person or a program, shows this.
+Every front end of a chat, for a person or a program, shows the result.
 """
 
 from collections.abc import Callable
@@ -23,13 +23,14 @@ from .run_files import Folder, write_turn
 
 @dataclass(frozen=True)
 class Shown:
-    """What came of a line.
+    """The result of a line.
 
     Attributes:
-        turn: its number in this chat, from 1.
-        run: the session as it then stands; its report is of this line, with the names of files.
-        before: the plan that stood before, where it is another than now.
-        changed: whether another plan stands now.
+        turn: number of the line in this chat, from 1.
+        run: the session's run after the line; its report is on this line and names its files.
+        before: the plan to compare the current one with: the one before the turn, or its parent
+            for a command that draws; None if the plan did not change, or the picture did.
+        changed: whether the report is of another plan than the one before.
         ends: whether the chat is over.
     """
 
@@ -41,7 +42,7 @@ class Shown:
 
     @property
     def report(self) -> Report:
-        """What came of the line."""
+        """The report on the line."""
         return self.run.report
 
 
@@ -49,9 +50,9 @@ class Talk:
     """A chat in one session at a time.
 
     Args:
-        folder: for plans and pictures.
-        agent_named: the agent with another model.
-        view: shows robots that drive.
+        folder: where plans and pictures are written.
+        agent_named: makes the agent with another model.
+        view: shows robots as they drive.
     """
 
     session = ""
@@ -70,7 +71,7 @@ class Talk:
 
     @property
     def run(self) -> Run:
-        """The session as it stands; before anything was said, with an empty world."""
+        """The session's current run; before anything was said, a blank one with an empty world."""
         held = self.service.session(self.session)
         if held.run is not None:
             return held.run
@@ -81,10 +82,10 @@ class Talk:
         return Run(blank, Answered((), context.world, ""), context, context.world)
 
     async def line(self, text: str, show: Show | None = None) -> Shown:
-        """Do what a line says.
+        """Carry out a line: a command if it begins with a slash, else words for the agent.
 
         Raises:
-            InputError: it cannot be done; nothing was.
+            InputError: the line cannot be carried out; nothing was done.
         """
         before, services = self.run, self.service.session(self.session).services
         if services is not None:
@@ -97,7 +98,7 @@ class Talk:
         self._turn += 1
         if isinstance(done, Run):
             return self._shown(before, done)
-        now = replace(self.run, report=self._told(text, done or "Bye."))
+        now = replace(self.run, report=self._unchanged_report(text, done or "Bye."))
         drawn = command is not None and command.draws
         return self._finished(
             now, self._parent(now) if drawn else None, drawn=drawn, ends=done is None
@@ -108,23 +109,23 @@ class Talk:
         await self.service.stop(self.session)
 
     def is_stop(self, text: str) -> bool:
-        """Whether a line, typed while a turn runs, says to stop."""
+        """Return whether a line typed while a turn runs says to stop."""
         return is_stop(text, driving=True)
 
     def failed(self, text: str, message: str) -> Shown:
-        """What there is to show of a line that could not be done."""
+        """Return the result of a line that could not be carried out, with that message."""
         self._turn += 1
-        report = self._told(text, message).model_copy(update={"status": "failed"})
+        report = self._unchanged_report(text, message).model_copy(update={"status": "failed"})
         return Shown(self._turn, replace(self.run, report=report))
 
     def words(self) -> list[str]:
-        """What can be completed."""
+        """Return the words offered for completion: commands, and ids of things and plans."""
         world = self.run.world
         things = [thing.id for thing in (*world.targets, *world.keep_out, *world.shown)]
         return [f"/{name}" for name in COMMANDS] + things + list(world.plans)
 
     def _shown(self, before: Run, run: Run) -> Shown:
-        """What a turn did, with its files."""
+        """Return the result of a turn, and write its files."""
         was, now = before.world.plans.get(before.world.current or ""), run.report
         changed = now.plan_id not in (None, before.report.plan_id)
         other = run.world.picture != before.world.picture
@@ -144,20 +145,20 @@ class Talk:
         said: dict[str, Any] = {"files": None}
         try:
             said["files"] = write_turn(self.folder, self._turn, run, before) if drawn else None
-        except StorageError as error:  # what was done is what has to be told
+        except StorageError as error:  # still report what was done
             said["message"] = f"{run.report.message} Files are missing: {error}"
         run = replace(run, report=run.report.model_copy(update=said))
         return Shown(self._turn, run, before, changed, ends)
 
     def _parent(self, run: Run) -> Plan | None:
-        """The plan that the one that stands was made from."""
+        """Return the plan that the current one was made from, or None."""
         plans = run.world.plans
         node = plans.get(run.world.current or "")
         parent = plans.get((node and node.parent) or "")
         return parent and parent.plan
 
-    def _told(self, text: str, message: str) -> Report:
-        """A report that changed nothing."""
+    def _unchanged_report(self, text: str, message: str) -> Report:
+        """Return the report on a line that changed nothing."""
         same = {"candidates": None, "arrival": None, "usage": Totals(), "files": None}
         said = {"status": "answered", "message": message, "instruction": text}
         return self.run.report.model_copy(update={**same, **said})

@@ -14,11 +14,11 @@ from .terminal import say
 
 
 class Prompt:
-    """Asks for messages with history across sessions and completion.
+    """Asks for messages, with history across sessions and completion.
 
     Args:
-        history: the file that keeps it.
-        words: what can be completed: commands, which begin with a slash, and ids.
+        history: the file that stores the history.
+        words: returns what can be completed: commands, which begin with a slash, and ids.
     """
 
     def __init__(self, history: Path, words: Callable[[], Sequence[str]]) -> None:
@@ -30,11 +30,11 @@ class Prompt:
         )
 
     async def ask(self, typed: Typed) -> str:
-        """The next message.
+        """Return the next message, already typed or asked for; "" if Ctrl-C discarded it.
 
         Raises:
-            EOFError: there will be none.
-            KeyboardInterrupt: Ctrl-C with nothing typed.
+            EOFError: the input has ended.
+            KeyboardInterrupt: Ctrl-C was pressed with nothing typed.
         """
         if (text := typed.take()) is not None:
             say(f"{PROMPT}{text}")
@@ -48,7 +48,7 @@ class Prompt:
 
 
 class _Words(Completer):
-    """Commands as they are typed, ids where the Tab key asks."""
+    """Completes commands as they are typed, and ids when Tab is pressed."""
 
     def __init__(self, words: Callable[[], Sequence[str]]) -> None:
         self._words = words

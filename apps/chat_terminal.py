@@ -1,4 +1,4 @@
-"""A chat as it goes: with a person at a terminal, or from the lines of a script."""
+"""The loop of a chat: with a person at a terminal, or over the lines of a script."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable
@@ -21,7 +21,7 @@ async def converse(talk: Talk, display: Display, ask: Ask) -> int:
     """Talk with a person until they leave.
 
     Returns:
-        What to exit with.
+        The exit code.
     """
     typed, hits = Typed(), 0
     while True:
@@ -50,13 +50,15 @@ async def converse(talk: Talk, display: Display, ask: Ask) -> int:
 
 
 async def run_script(talk: Talk, lines: Iterable[str], display: Display | None) -> int:
-    """Carry out lines in order, each whole before the next, until one cannot be.
+    """Carry out lines in order, each finished before the next, until one fails or ends the chat.
+
+    Blank lines and comments, which begin with #, are skipped.
 
     Args:
-        display: None for a JSON object a line.
+        display: None for one JSON object per line.
 
     Returns:
-        What to exit with.
+        The exit code.
     """
     for line in lines:
         text = line.strip()
@@ -85,9 +87,10 @@ async def run_script(talk: Talk, lines: Iterable[str], display: Display | None) 
 async def _interruptible(
     talk: Talk, text: str, display: Display | None, typed: Typed | None = None
 ) -> tuple[Shown | None, int]:
-    """What came of a line, and how often Ctrl-C was pressed; None where twice.
+    """Carry out a line; return its result and how often Ctrl-C was pressed.
 
-    The first stops the turn and the robots, as a line that says stop does.
+    The first Ctrl-C stops the turn and the robots, as a typed line that says stop does; a
+    Ctrl-C after either cancels the work, and the result is None.
     """
     work = asyncio.create_task(talk.line(text, display.step if display else None))
     stops: set[asyncio.Task[None]] = set()

@@ -34,7 +34,7 @@ from .agents import agent_of, tracer_of_environment
 from .given import picture_and_words, settings_given
 from .mcp.command import mcp
 from .run_files import Folder, write_files
-from .stated import decided
+from .stated import resolve_decider
 from .terminal import say
 from .terminal_session import TerminalSession
 from .window import watching
@@ -112,8 +112,8 @@ def run(
     (picture, words), keep = picture_and_words(ctx.params), arguments.recording(record)
     settings = settings_given(ctx.params, picture, may_deploy=not plan_only)
     given = arguments.shown((point, box, outline, target), mask, picture)
-    things = arguments.numbered(given), arguments.kept_out(keep_out), settings
-    who, said = decided(contract, *things, model=model, planner=planner, picture=picture)
+    things = arguments.numbered(given), arguments.keep_out_things(keep_out), settings
+    who, said = resolve_decider(contract, *things, model=model, planner=planner, picture=picture)
     decider = agent_of(*who, base_url, prompt, prompts, limit, policy)
     with decider as agent, Folder(out) as home, watching(watch) as services:
         made = agent.run(picture, words, trace=home.trace, services=services, **said)
@@ -159,8 +159,8 @@ def resume(
             left = agent.say(left, words)
         elif answer is approve is None and isinstance(left.outcome, Answered | Paused):
             if isinstance(left.outcome, Paused) and not session.can_ask:
-                write_files(home, left)  # it may have been killed before it had written them
-                agent.resume(left)  # which says what it waits for
+                write_files(home, left)  # it may have been killed before writing them
+                agent.resume(left)  # raises an error that says what it waits for
         else:
             left = agent.resume(left, answer=answer, approve=approve)
         raise typer.Exit(session.serve(left))
@@ -184,11 +184,11 @@ def demonstrate(out: o.DemoOut = Path("formup-runs", "demo")) -> None:
 @app.command(name="doctor")
 def look_around(as_json: o.Json = False) -> None:
     """Say what is installed and within reach, for a report of a bug; nothing secret is shown."""
-    say(doctor.told(as_json=as_json))
+    say(doctor.findings_text(as_json=as_json))
 
 
 def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
-    """A draft may have changed since a run was begun with it."""
+    """Check that no prompt, such as a draft, has changed since the run began; else InputError."""
     was = {prompt_name(p): p["sha256"] for p in start.get("prompts", ())}
     for prompt in agent.prompts:
         if was.get(prompt.name, prompt.sha256) != prompt.sha256:

@@ -63,7 +63,7 @@ def deploy(
     if chosen.partial is not None:
         say(f"formup: a partial plan: {chosen.partial.sentence}", error=True)
     if trajectories is not None:
-        raise typer.Exit(_exported(context, chosen, plan, trajectories))
+        raise typer.Exit(_export_trajectories(context, chosen, plan, trajectories))
 
     def keep(world: World) -> None:
         write_whole(plan, plan_file(world, chosen.id, stored.instruction or "", picture))
@@ -72,7 +72,7 @@ def deploy(
         context.services.view = services.view
         with _session(plan, context) as session:
             context = context.at(session.start(context.world))
-            context = context.at(_driven(context, chosen, leave, plan, session, keep))
+            context = context.at(_drive_robots(context, chosen, leave, plan, session, keep))
         films = write_films(plan.parent, film, context, chosen, context.words)
         report = _report(chosen, context.world, stored, films)
         if as_json:
@@ -83,12 +83,12 @@ def deploy(
         raise typer.Exit(report.exit_code)
 
 
-def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
-    """Write how robots would get to a plan from where the session beside it left them."""
+def _export_trajectories(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
+    """Write robots' trajectories to a plan from where the session left them; return exit code 0."""
     with _session(plan, context) as session:
         context = context.at(session.start(context.world))
     try:
-        found = asyncio.run(_and_closed(context, trajectories_to(context, chosen)))
+        found = asyncio.run(_closing_fleets(context, trajectories_to(context, chosen)))
     except ToolError as error:
         raise InputError(f"{plan}: {error}") from None
     scale = context.world.metres_per_pixel
@@ -98,8 +98,8 @@ def _exported(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
     return 0
 
 
-async def _and_closed(context: Context, work: Awaitable[Made]) -> Made:
-    """What comes of the work, with the fleets, and cameras of theirs, let go of."""
+async def _closing_fleets(context: Context, work: Awaitable[Made]) -> Made:
+    """Return the result of the work, then close the fleets and their cameras, even if it fails."""
     try:
         return await work
     finally:
@@ -108,22 +108,26 @@ async def _and_closed(context: Context, work: Awaitable[Made]) -> Made:
 
 @dataclass
 class Session:
-    """The session that a plan.json lies beside, which learns where robots are; or none."""
+    """The session that a plan.json lies beside, kept up to date on its robots; or a stand-in.
+
+    Attributes:
+        world: the session's world; None if there is no session, so that nothing is recorded.
+    """
 
     recorder: LogRecorder
     world: World | None
 
     def start(self, world: World) -> World:
-        """A plan's world, with robots where the session left them."""
+        """Return a plan's world, with robots where the session left them."""
         return world if self.world is None else world.having(robots=self.world.robots)
 
     async def moving(self, plan_id: str) -> None:
-        """Write down that robots are about to move."""
+        """Record that robots are about to move."""
         if self.world is not None:
             await self.recorder.moving(plan_id, self.world)
 
     def end(self, world: World) -> None:
-        """Write down where robots are, and what was observed of a plan of the session."""
+        """Record where robots are, and the arrivals observed at plans of the session."""
         if self.world is None:
             return
         known = {n: a for n, a in world.arrivals.items() if n in self.world.plans}
@@ -133,7 +137,7 @@ class Session:
 
 @contextmanager
 def _session(plan: Path, context: Context) -> Generator[Session, None, None]:
-    """The session beside a plan.json; no other process may write it meanwhile."""
+    """Yield the session beside a plan.json, whose log no other process may write meanwhile."""
     artefacts, path = context.services.artefacts, plan.parent / NAME
     if not path.exists():
         yield Session(LogRecorder(None, artefacts, None, None), None)
@@ -143,7 +147,7 @@ def _session(plan: Path, context: Context) -> Generator[Session, None, None]:
         yield Session(LogRecorder(log, artefacts, world, None), world)
 
 
-def _driven(
+def _drive_robots(
     context: Context,
     plan: Plan,
     follow: Follow | None,
@@ -151,12 +155,12 @@ def _driven(
     session: Session,
     keep: Callable[[World], None],
 ) -> World:
-    """The world after the robots have driven; where they failed on the way, with what was seen."""
+    """Drive the robots and return the world after it; if they fail on the way, as last observed."""
     observed: list[World] = []
     watching = replace(context, observed=observed.append, moving=session.moving, agreed=True)
     try:
         node = watching.world.plan(plan.id)
-        driven = asyncio.run(_and_closed(context, drive_to(watching, node, follow)))
+        driven = asyncio.run(_closing_fleets(context, drive_to(watching, node, follow)))
         observed.append(driven[1])
     except ToolError as error:
         raise InputError(f"{path}: {error}") from None

@@ -1,6 +1,6 @@
-"""`formup doctor`: what is installed and within reach, for reports of bugs.
+"""`formup doctor`: what is installed and within reach, for bug reports.
 
-What is broken is what it has to tell: it imports the standard library alone until it looks.
+It must run in a broken installation too, so it imports other packages only while it checks them.
 """
 
 import io
@@ -30,20 +30,20 @@ PURPOSES = {
     "serve": "a server",
     "torch": "trained networks",
 }
-"""What extras are for; of others their packages are named."""
+"""What each extra is for; for other extras, their packages are listed."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
 
 
-def told(*, as_json: bool) -> str:
-    """All there is to say, as JSON or for a person, one thing a line."""
+def findings_text(*, as_json: bool) -> str:
+    """Return all findings, as JSON or, for a person, one per line."""
     found: dict[str, dict[str, str]] = {}
-    noise = io.StringIO()  # packages may print as they are imported
+    noise = io.StringIO()  # packages may print when imported
     with redirect_stdout(noise), redirect_stderr(noise):
         for looks in (_installed, _surroundings, _storage, _registered):
             try:
                 for kind, name, look in looks():
                     found.setdefault(kind, {})[name] = _found_out(look)
-            except Exception as error:  # of a library that all of it needs; the rest is said
+            except Exception as error:  # from a library the whole group needs; go on
                 found.setdefault("broken", {})[looks.__name__.strip("_")] = str(error)
     if as_json:
         return json.dumps(found, indent=2)
@@ -52,7 +52,7 @@ def told(*, as_json: bool) -> str:
 
 
 def _found_out(look: Callable[[], object]) -> str:
-    """What a look finds, or why it finds nothing: what others wrote may raise anything."""
+    """Return what a look finds, or why it failed; other people's code may raise anything."""
     try:
         return str(look())
     except (Exception, SystemExit) as error:
@@ -98,12 +98,12 @@ def _storage() -> Looks:
     file = None if "://" in path else Path(path)
 
     def look() -> str:
-        if file is not None and not file.exists():  # looking must not make it
+        if file is not None and not file.exists():  # looking must not create it
             return f"{_writable(file)}; no sessions"
         with closing(store_at(address)) as store:
             can = _writable(file) if file else f"{store.label} can be written"
             try:
-                store.rename("none", "")  # a database first asks who may write
+                store.rename("none", "")  # a database checks who may write first
             except StorageError as error:
                 can = can if error.kind == "missing" else str(error).rstrip(".")
             return f"{can}; {len(store.sessions())} sessions"

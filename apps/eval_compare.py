@@ -30,7 +30,7 @@ STYLE = {
 
 
 def _command(concluded: Callable[[Comparison], int]) -> Callable[..., None]:
-    """The command that compares two runs, and ends with the exit code that `concluded` gives."""
+    """Make a command that compares two runs and exits with the code that `concluded` returns."""
 
     def command(
         a: o.OldRun,
@@ -97,7 +97,17 @@ def _metric_named(text: str) -> Metric:
 
 
 def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
-    """The rows of one arm of a folder: the only one, or that of, else with, all these words."""
+    """Return the rows of one arm of a folder.
+
+    Args:
+        named: words that all fit the arm: words of its name, its prompt, or the beginning of
+            PROMPT#SHA256. An arm whose name has no further words goes first. None for the only
+            arm there is.
+        option: named in the error.
+
+    Raises:
+        InputError: the folder has rows, but not exactly one arm fits.
+    """
     rows = read_rows(folder)
     words = named.split() if named else []
     arms = {arm.name: arm for arm in (row.arm for row in rows)}
@@ -135,7 +145,7 @@ def _print_comparison(console: Console, made: Comparison) -> None:
 
 
 def _scores(made: Comparison) -> Table:
-    """How each does; intervals at 95 %."""
+    """Return a table of each version's scores; intervals at 95 %."""
     table = _plain_table(made.metric, "", "new tasks", "these tasks")
     for k in made.overall.a.pass_k:
         table.add_column(f"pass^{k}", justify="right", no_wrap=True)
@@ -148,7 +158,7 @@ def _scores(made: Comparison) -> Table:
 
 
 def _differences(made: Comparison) -> Table:
-    """B minus A over all tasks and by slice, in points; intervals at 95 %."""
+    """Return a table of B minus A over all tasks and by slice, in points; intervals at 95 %."""
     table = _plain_table("B - A", "tasks", "points", "new tasks", "p", "these tasks", "p", "")
     slices = ((n, d) for values in made.slices.values() for n, d in values.items())
     for name, found in (("all", made.overall), *slices):
@@ -176,7 +186,7 @@ def _plain_table(first: str, *titles: str) -> Table:
 
 
 def _print_conclusion(console: Console, made: Comparison) -> None:
-    """Whether there is a difference, whether B may replace A, and what would settle either."""
+    """Print whether there is a difference, whether B may replace A, and what would settle each."""
     outcome, verdict, reasons = made.outcome, made.verdict, "; ".join(made.reasons)
     console.print(styled("difference: ", (outcome, STYLE[outcome])))
     console.print(

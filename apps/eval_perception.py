@@ -1,4 +1,4 @@
-"""`formup eval perception`: how exact outlines are, and what the confidence in them is worth."""
+"""`formup eval perception`: how accurate outlines are, and how well confidence predicts it."""
 
 import json
 from dataclasses import asdict

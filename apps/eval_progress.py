@@ -1,4 +1,4 @@
-"""A sweep of trials on the terminal: how far it is, the time left, what it has cost so far."""
+"""The progress of a sweep of trials on the terminal: trials done, time left, cost so far."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,9 +16,9 @@ from ..evals.experiments.trials import Trial
 def sweep(
     trials: Sequence[Trial], work: Work, folder: Path, *, console: Console | None = None, **how: Any
 ) -> Sweep:
-    """`run_trials` under a progress bar on stderr; `how` are its other arguments.
+    """Call `run_trials` with a progress bar on stderr; `how` are its other arguments.
 
-    What an earlier run has done counts as done, and not towards the speed.
+    Trials done by an earlier run count as done, but not towards the speed.
     """
     columns = (
         TextColumn("{task.description}"),

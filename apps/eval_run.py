@@ -1,4 +1,4 @@
-"""`formup eval run`: a suite by one or several methods, as counts with the chance level."""
+"""`formup eval run`: runs a suite with one or several methods; counts beside the chance level."""
 
 import json
 from collections.abc import Generator, Mapping, Sequence
@@ -41,7 +41,7 @@ from .terminal import say
 RUNS = Path("formup-runs")
 SUMMARY = "summary.json"
 JITTERS = 3
-"""Tries of a task where each points in another way."""
+"""Default tries of a task in a mode where each try points in another way."""
 
 
 def run_suite(
@@ -94,12 +94,12 @@ def run_suite(
 
 
 def processes(count: int) -> Executor:
-    """What runs trials in so many processes."""
+    """Return an executor that runs trials in that many processes."""
     return executor("serial" if count == 1 else "pool", count)
 
 
 def say_stopped(done: Sweep) -> None:
-    """Say why a sweep stopped before its end, if it did, and end with the exit code of that."""
+    """If a sweep stopped early, say why and exit with code 4."""
     if done.stopped is not None:
         say(f"formup: stopped: {done.stopped}", error=True)
         raise typer.Exit(4)
@@ -112,7 +112,7 @@ def _arms(
     descriptors: list[str] | None,
     rates: Mapping[str, float],
 ) -> list[Method]:
-    """Every model with every prompt and descriptor."""
+    """Return the method with every combination of model, prompt and descriptor."""
     return [
         check_method(
             replace(
@@ -130,7 +130,7 @@ def _arms(
 
 
 def _say_costs(arms: Sequence[Method], trials: int) -> None:
-    """About what the trials of each arm would take, with tokens as usual for its method."""
+    """Print roughly what each arm's trials would cost, with the tokens its method usually takes."""
     costs = list[float | None]()
     for arm in arms:
         each, model = usual_tokens(arm.name), "+".join(filter(None, (arm.model, arm.planner)))
@@ -143,7 +143,14 @@ def _say_costs(arms: Sequence[Method], trials: int) -> None:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A suite in a run's folder, ready to be tried: the trials of each arm, and what runs them."""
+    """A suite in a run's folder, ready to be tried.
+
+    Attributes:
+        sha256: hash of the suite with its pictures.
+        trials: the trials of each arm, in the order of the arms.
+        work: runs the trials.
+        levels: the chance level by name of cell.
+    """
 
     sha256: str
     trials: Sequence[Sequence[Trial]]
@@ -155,12 +162,12 @@ class Prepared:
 def prepared(
     suite: Suite, tried: Sequence[tuple[Method, Sequence[Task], int]], split: str, folder: Path
 ) -> Generator[Prepared, None, None]:
-    """Draw a suite's pictures and write it down in a folder.
+    """Render a suite's pictures, store the suite in a run's folder, and yield it ready to be tried.
 
     Args:
-        suite: that is run.
-        tried: by whom, which of its tasks, and how often each.
-        split: of the suite; of the test split nothing is kept but scores.
+        suite: the suite to run.
+        tried: each method with the tasks it tries and the number of tries of each.
+        split: of the suite; of the test split only scores are stored, and the look is recorded.
         folder: of the run.
     """
     levels, held_out, attempts = chances(suite.tasks), split == "test", folder / ATTEMPTS
@@ -187,10 +194,10 @@ def prepared(
 
 
 def tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -> list[Task]:
-    """The tasks that are tried: those named, or all, as far as every arm takes them.
+    """Return the tasks to try: those named, or all, except any that some arm does not take.
 
     Raises:
-        InputError: there is none of a name, or none is left.
+        InputError: there is no task of a name, or none is left.
     """
     known = {task.id: task for task in suite.tasks}
     for name in names or ():
@@ -217,14 +224,14 @@ def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -
 
 
 def new_folder(suite: str) -> Path:
-    """A folder for a run of a suite that begins now."""
+    """Return the path of a folder for a run of a suite that begins now."""
     return RUNS / f"{suite}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
 
 
 def _print_summary(
     suite: Suite, folder: Path, planned: Sequence[Trial], levels: dict[str, Chance]
 ) -> None:
-    """Tables of each arm, and all of them as JSON."""
+    """Print the tables of each arm, and write their cells as JSON."""
     keys = {trial.key for trial in planned}
     rows = [row for row in read_rows(folder) if row.key in keys]
     summary = dict[str, object]()

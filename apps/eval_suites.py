@@ -1,4 +1,4 @@
-"""`formup eval suites`, `add` and `descriptors`: what suites there are, and what is in them."""
+"""`formup eval suites`, `add` and `descriptors`: lists suites, makes one, measures its shapes."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +15,7 @@ from . import eval_options as e
 from .terminal import say, styled
 
 NAMED = 5
-"""Problems that are named."""
+"""Most problems that an error spells out."""
 
 
 def suites() -> None:

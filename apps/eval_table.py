@@ -1,4 +1,4 @@
-"""`formup eval table`: the paper's tables with our rows beside the paper's, and two of our own."""
+"""`formup eval table`: the paper's tables with our results beside the paper's, and two more."""
 
 from functools import partial
 from pathlib import Path
@@ -33,7 +33,7 @@ from .terminal import say, styled
 
 TERMINAL = "terminal"
 HEAD, CELL = 28, 12
-"""Characters of the columns on a terminal, which may have to be wider than it is."""
+"""Widths in characters of the first column and the others; a table may outgrow the terminal."""
 Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3, hard or ablations.")]
 Models = Annotated[
     list[str] | None,
@@ -113,7 +113,12 @@ def table(
 def _ran(
     suite: Suite, tried: list[tuple[Entry, list[Task]]], folder: Path, how: dict[str, Any]
 ) -> tuple[list[Planned], list[TrialRow], Sweep | None]:
-    """Run what a folder does not hold yet; the rows of a table, and those of its trials."""
+    """Run the trials that a folder does not hold yet.
+
+    Returns:
+        The planned rows of the table, the rows of its trials, and the sweep, None if there were
+        no trials.
+    """
     filled = [(e.arm, own, e.trials) for e, own in tried if e.arm is not None]
     with prepared(suite, filled, "dev", folder) as made:
         own = iter(made.trials)
@@ -127,10 +132,10 @@ def _ran(
 
 
 def _folder(name: str, resume: bool) -> Path:
-    """The latest folder of a table, or a new one.
+    """Return the path of a new folder for a table, or, to resume, of its latest one.
 
     Raises:
-        InputError: there is none to go on with.
+        InputError: there is no folder to resume.
     """
     if not resume:
         return new_folder(f"table-{name}")
@@ -143,12 +148,12 @@ def _folder(name: str, resume: bool) -> Path:
 def _with_tasks(
     suite: Suite, found: list[Entry], names: list[str] | None
 ) -> list[tuple[Entry, list[Task]]]:
-    """The rows with the tasks that each is tried on."""
+    """Pair each row with the tasks that it is tried on."""
     return [(entry, tasks_tried(suite, [entry.arm] if entry.arm else [], names)) for entry in found]
 
 
 def _write(made: Tabled, folder: Path) -> None:
-    """Write all forms of a table into its folder; the page shows the first try of each task."""
+    """Write a table in all formats to its folder; the page shows the first try of each task."""
     for ending, write in FORMATS.values():
         write_whole(folder / f"table.{ending}", write(made).encode())
     rows = [row for row in made.trials if row.trial == 0]
@@ -180,6 +185,6 @@ def _grid(made: Tabled) -> Grid:
 
 
 def _stacked(result: Result) -> Text:
-    """A cell of four lines: k/n, interval, GCR, the paper's figure."""
+    """Return a cell's lines: k/n, interval, GCR, any ablation's difference, the paper's figure."""
     told = f"\npaper {paper(result)}" if result.paper else ""
     return styled("\n".join(parts(result)), (told, "dim"))

@@ -1,4 +1,4 @@
-"""What a run of a suite came to, on the terminal: scores, what was placed, cost, and the misses."""
+"""The results of a run on the terminal: scores, what was placed, turns, tokens and misses."""
 
 from collections.abc import Sequence
 from statistics import median
@@ -16,12 +16,12 @@ PLACED = (
     *("right,\nif placed", "success,\nif placed", "mean\nIoU", "e95"),
 )
 MISSES = 200
-"""Misses that are listed; the report shows all."""
+"""Most misses to list; the report shows all of them."""
 LONGEST = 150
 
 
 def print_scores(title: str, found: Sequence[Cell]) -> None:
-    """Successes by cell with intervals and the chance level."""
+    """Print successes by cell, with intervals and the chance level."""
     extra = [n for n in ("invalid", "lost") if any(getattr(cell, n) for cell in found)]
     table = _number_table(title, *SCORES, *extra)
     for cell in found:
@@ -40,7 +40,7 @@ def print_scores(title: str, found: Sequence[Cell]) -> None:
 
 
 def print_placed(found: Sequence[Cell]) -> None:
-    """Shares of the trials, and of those that placed robots, by category, setup and style."""
+    """Print shares of all trials and of those that placed robots, by category, setup and style."""
     table = _number_table(None, *PLACED)
     for cell in (cell for cell in found if " " not in cell.name):
         right, known = cell.right_thing
@@ -58,7 +58,7 @@ def print_placed(found: Sequence[Cell]) -> None:
 
 
 def print_turns(rows: Sequence[TrialRow]) -> None:
-    """Turns of dialogues that were right, and of those that were to change nothing, which did."""
+    """Print how many turns of dialogues were right, and how many rightly changed nothing."""
     turns = [row.turns for row in rows if row.turns is not None]
     if not turns:
         return
@@ -71,7 +71,7 @@ def print_turns(rows: Sequence[TrialRow]) -> None:
 
 
 def print_spent(rows: Sequence[TrialRow]) -> None:
-    """Requests and tokens of a trial, if a language model was asked."""
+    """Print the median requests and tokens of a trial, if a language model was used."""
     scored = [row for row in rows if row.scored]
     if not any(row.input_tokens for row in scored):
         return
@@ -84,7 +84,7 @@ def print_spent(rows: Sequence[TrialRow]) -> None:
 
 
 def print_misses(rows: Sequence[TrialRow]) -> None:
-    """The trials that were not strictly right, and why."""
+    """Print the trials that were not strictly right, and why."""
     console = Console(highlight=False, soft_wrap=True)
     misses = [row for row in rows if not row.strict and row.feedback]
     for row in misses[:MISSES]:

@@ -1,4 +1,4 @@
-"""`formup eval train-rl`: policies for the row of reinforcement learning in table 1."""
+"""`formup eval train-rl`: trains policies for the reinforcement learning row of table 1."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""`formup eval`: its commands in one place."""
+"""`formup eval`: the group of its commands."""
 
 import typer
 

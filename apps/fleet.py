@@ -1,4 +1,4 @@
-"""`formup fleet`: look at a fleet before it is driven, or stand in for its robots."""
+"""`formup fleet`: checks a fleet before it is driven, or stands in for its robots."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a command line gives to work on: the picture of a file or a camera, and what is fixed."""
+"""The inputs of a command line: a picture from a file or a camera, and the settings."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,10 +14,10 @@ from .starts import starts
 
 
 def picture_and_words(options: Mapping[str, Any]) -> tuple[Picture, str]:
-    """The picture and the instruction; with --camera the only word is the instruction.
+    """Return the picture and the instruction; with --camera, a lone argument is the instruction.
 
     Raises:
-        InputError: as of `picture_given`, or one of them is missing.
+        InputError: as for `picture_given`, or one of them is missing.
     """
     words = options["instruction"]
     if options["camera"] is not None and words is None:
@@ -32,14 +32,18 @@ def picture_and_words(options: Mapping[str, Any]) -> tuple[Picture, str]:
 
 
 def picture_given(options: Mapping[str, Any]) -> Picture | None:
-    """The picture of a file or a camera, as seen straight from above where there is a calibration.
+    """Return the picture from a file or a camera, rectified to a top view by any calibration.
 
     Args:
-        options: of the command line by their names: `image`, `camera`, perhaps `calibration` and
+        options: the command line's options by name: `image`, `camera`, perhaps `calibration` and
             `metres_per_pixel`.
 
+    Returns:
+        The picture; None if neither a file nor a camera is given.
+
     Raises:
-        InputError: it cannot be had, or is said twice, or there is none to rectify.
+        InputError: the picture cannot be read or taken, the picture or the scale is given twice,
+            or there is a calibration without a picture.
     """
     image, camera, file = options["image"], options["camera"], options.get("calibration")
     if image is not None and camera is not None:
@@ -58,14 +62,14 @@ def picture_given(options: Mapping[str, Any]) -> Picture | None:
 def settings_given(
     options: Mapping[str, Any], picture: Picture | None, *, may_deploy: bool = True
 ) -> Settings:
-    """What the person fixed.
+    """Return the settings that the options fix.
 
     Args:
-        options: of the command line by their names.
-        picture: whose file may say its scale.
+        options: the command line's options by name.
+        picture: its file may state its scale.
 
     Raises:
-        InputError: one of them cannot be used.
+        InputError: one of the options cannot be used.
     """
     texts = ("robots", "metres_per_pixel", "robot_radius", "clearance", "threshold", "seed")
     fixed = arguments.numbers(*(options[name] for name in texts), picture=picture)

@@ -1,4 +1,4 @@
-"""The entry point: exit codes, one sentence for every error a user can cause, Ctrl-C at once."""
+"""The entry point: exit codes, one sentence for every user error, immediate Ctrl-C."""
 
 import io
 import os
@@ -11,12 +11,12 @@ from ..tools.visible import visible
 
 INTERRUPTED = 130
 WINDING_UP = 0.2
-"""Seconds for the thread of a tool that is done to end."""
+"""Seconds to wait for each tool's thread to end before exiting without it."""
 
 
 def main() -> None:
     """Run the command line and exit."""
-    # Python's own, which asyncio turns into a cancellation: a run then ends with its messages kept.
+    # asyncio turns Python's own handler into a cancellation, so a run ends with messages stored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -26,12 +26,12 @@ def main() -> None:
     except KeyboardInterrupt:
         print("formup: interrupted; nothing more is done.", file=sys.stderr)  # noqa: T201
         code = INTERRUPTED
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # too late: the work is done
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # too late to interrupt: the work is done
     _leave(code)
 
 
 def _leave(code: int) -> None:
-    """Exit; native code of a tool that was given up must not be torn down while it runs."""
+    """Exit, skipping teardown while the native code of a tool that was given up still runs."""
     from ..tools.tool import THREAD
 
     tools = [thread for thread in threading.enumerate() if thread.name == THREAD]
@@ -46,11 +46,15 @@ def _leave(code: int) -> None:
 
 
 def _say_broken(error: Exception) -> int:
-    """What to do about an installation that is broken, by the standard library alone."""
+    """Say what to do about a broken installation, using the standard library alone.
+
+    Returns:
+        The exit code.
+    """
     from . import doctor
 
     if sys.argv[1:2] == ["doctor"]:
-        print(visible(doctor.told(as_json="--json" in sys.argv)))  # noqa: T201
+        print(visible(doctor.findings_text(as_json="--json" in sys.argv)))  # noqa: T201
         return 0
     advice = "formup doctor says what is broken; install that anew."
     print(f"formup: {visible(str(error))}; {advice}", file=sys.stderr)  # noqa: T201
@@ -65,7 +69,7 @@ def _run() -> int:
         from ..tools.errors import FleetError, FormupError, ModelError
         from .cli import app
         from .run_display import say_failed
-    except Exception as error:  # whatever a library that is broken raises as it is loaded
+    except Exception as error:  # a broken library may raise anything when imported
         sys.exit(_say_broken(error))
     try:
         code = app(standalone_mode=False) or 0
@@ -80,10 +84,10 @@ def _run() -> int:
     except (FormupError, PromptError) as error:
         say_failed(str(error))
         return 4 if isinstance(error, (ModelError, FleetError)) else 2
-    except ImportError as error:  # of what is loaded where it is needed
+    except ImportError as error:  # of a module imported only where it is needed
         return _say_broken(error)
     except BrokenPipeError:
-        sys.stderr.close()  # the reader has gone; there is nobody to tell
+        sys.stderr.close()  # the reader has gone, so an error would reach nobody
         return 0
     except OSError as error:
         say_failed(f"{error.strerror or error} ({error.filename or 'output'}).")

@@ -1,4 +1,4 @@
-"""`formup prompts`: look at prompts, try them, make new ones, release and promote them."""
+"""`formup prompts`: shows, renders, checks, drafts, releases and promotes prompts."""
 
 import json
 from collections.abc import Sequence
@@ -176,13 +176,13 @@ def promote_version(
 
 
 def _rows(library: PromptLibrary) -> list[dict[str, Any]]:
-    """All prompts as data; of those that cannot be used, why."""
+    """Return all prompts as data, with the error of each that cannot be used."""
     current: set[str] = set()
     for id in library.ids():
         try:
             current.add(library.current(id))
         except PromptError:
-            continue  # an id of drafts alone
+            continue  # an id that has only drafts
     rows: list[dict[str, Any]] = []
     for name in library.names():
         row = {"name": name, "current": name in current, "path": str(library.path(name))}
@@ -199,7 +199,7 @@ def _facts(prompt: Prompt) -> dict[str, Any]:
 
 
 def _findings(library: PromptLibrary, names: Sequence[str] | None) -> list[Finding]:
-    """What lint finds, what was copied from a suite, and tools that are not what they were."""
+    """Return the findings of lint, texts copied from a suite, and tools changed since a release."""
     found = lint(library, names or None)
     broken = {f.prompt for f in found if f.rule == "unusable"}
     chosen = [n if "@" in n else library.current(n) for n in names or library.names()]

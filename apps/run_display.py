@@ -1,4 +1,4 @@
-"""A run on the terminal: what was found, the contract, its certificate, the arrival table."""
+"""The report of a run on the terminal: things found, contract, certificate, arrival table."""
 
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,11 +16,11 @@ from ..tools.motion.checking import MotionVerdict
 from .terminal import say, styled, under
 
 LONGEST = 600
-"""Characters of an error message; a value given may be vast."""
+"""Most characters of an error message to show; a value it quotes may be vast."""
 MAX_ROWS = 16
-"""Robots shown in the arrival table; the rest are summed up."""
+"""Most robots in the arrival table, the rest being summed up; and most findings listed."""
 COLUMN = 14
-"""Where texts begin; what precedes them is ours."""
+"""The column where texts begin; only labels that formup itself writes stand before it."""
 PLACES = {
     "around": "around",
     "cage": "caging",
@@ -89,7 +89,7 @@ def _show_target(console: Console, target: Mapping[str, Any]) -> None:
 
 
 def _files(console: Console, report: Report, folder: str) -> None:
-    """What was written, and how to go on from there."""
+    """Print which files were written, and how to go on from there."""
     files = {name: file for name, file in (report.files or {}).items() if file}
     if report.contract is not None and "contract" in files:
         written = report.contract.model_dump_json(exclude_defaults=True)
@@ -105,14 +105,14 @@ def _files(console: Console, report: Report, folder: str) -> None:
 
 
 def at_terminal() -> bool:
-    """Whether a person reads and can answer."""
+    """Return whether a person reads the output and can answer."""
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def ask(what: str) -> str:
-    """The person's answer to the question just shown; empty to leave it open."""
+    """Ask for the answer to the question just shown; return it, empty to leave it open."""
     say(f"{what} (Enter leaves it open): ", end="")
-    line = sys.stdin.buffer.readline()  # not input(): it chokes on bytes that are no text
+    line = sys.stdin.buffer.readline()  # not input(): it fails on bytes that are not text
     if not line.endswith(b"\n"):
         say("")
     return line.decode(errors="replace").strip()
@@ -134,13 +134,13 @@ def _line(console: Console, name: str, text: str) -> None:
 
 
 def choice_words(choice: Mapping[str, Any]) -> str:
-    """What a question offers, by the number it bears in the picture."""
+    """Return a line on a choice of a question, beginning with its number in the picture."""
     box = ", ".join(f"{v:.0f}" for v in choice["box"])
     return f"{choice['id'].removeprefix('c')}: {choice['label']}, box ({box})"
 
 
 def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
-    """What a question offers; candidates by the number they bear in the picture."""
+    """Print a table of a question's choices, by their numbers in the picture."""
     table = Table(box=None, padding=(0, 2), pad_edge=False, header_style="cyan")
     for title in ("number", "looks like", "box"):
         table.add_column(title, justify="right" if title == "number" else "left")
@@ -151,7 +151,7 @@ def _choices(console: Console, candidates: Sequence[Mapping[str, Any]]) -> None:
 
 
 def group_words(group: Group, scale: float | None) -> str:
-    """What a group demands, in a line."""
+    """Return what a group demands, in one line."""
     noun = "robot" if group.robots == 1 else "robots"
     words = [
         f"{group.robots} {noun} {PLACES.get(group.relation, group.relation)}",
@@ -177,7 +177,7 @@ def group_words(group: Group, scale: float | None) -> str:
 
 
 def _demands(group: Group, scale: float | None) -> list[str]:
-    """What a group demands beside its arrangement and its distance."""
+    """Return what a group demands besides its arrangement and distance, as at most one clause."""
     said: list[str] = []
     if group.shape is not None:
         said.append(f"forming {group.shape.name} ({group.shape.where or 'where it says'})")
@@ -207,7 +207,7 @@ def _scale(report: Report) -> float | None:
 
 
 def _measures(measures: dict[str, Measure], scale: float | None) -> str:
-    """Measures as words."""
+    """Return measures as text."""
     words: list[str] = []
     for name, value in measures.items():
         if not isinstance(value, str):
@@ -217,7 +217,7 @@ def _measures(measures: dict[str, Measure], scale: float | None) -> str:
 
 
 def certificate_lines(report: Report) -> list[tuple[str, str]]:
-    """What a certificate says, as texts with what they are."""
+    """Return a certificate as pairs of a label and a text."""
     verdict = report.verdict
     assert verdict is not None
     lines = [] if report.partial is None else [("partial", report.partial.sentence)]
@@ -233,7 +233,7 @@ def certificate_lines(report: Report) -> list[tuple[str, str]]:
 
 
 def _motion(motion: MotionVerdict, scale: float | None) -> str:
-    """What the certificate of a motion says."""
+    """Return the certificate of a motion as text."""
     if not motion.certified:
         return f"not certified: {motion.findings[0].sentence}"
     words = [f"{motion.makespan_s:.1f} s, longest way {length_text(motion.longest_px, scale)}"]

@@ -1,4 +1,4 @@
-"""The files a run leaves: plan, picture, animation and trace, each whole or not at all."""
+"""The files that a run leaves: plan, picture, animation and trace, each written atomically."""
 
 import io
 import time
@@ -21,13 +21,21 @@ from ..tools.world import PlanNode
 
 CONTRACT = "contract.json"
 PASSING = ("plan.png", "question.png", "found.png", CONTRACT)
-"""What a later turn, or the answer to a question, may leave without meaning."""
+"""Files that a later turn, or the answer to a question, may make obsolete."""
 QUICK = 1
-"""How hard a picture is compressed: a fourth of the time, for a fourth more bytes."""
+"""PNG compression level of pictures: a fourth of the time, for a fourth more bytes."""
 
 
 class Folder:
-    """Where a run's files go; made at once so that an unusable place is found before the work."""
+    """The folder of a run's files; created at once, so that an unusable path shows before the work.
+
+    Args:
+        path: None for a new folder in formup-runs, named by the time.
+        resumed: whether the run goes on from files in the folder, which may become obsolete.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
 
     def __init__(self, path: Path | None, *, resumed: bool = False) -> None:
         self.path = path or _fresh(Path("formup-runs"))
@@ -46,7 +54,7 @@ class Folder:
 
     @property
     def trace(self) -> Path:
-        """Where the run is written down."""
+        """The file that the run is recorded in."""
         return self.path / NAME
 
     def draw(self, name: str, image: Any) -> str:
@@ -62,7 +70,7 @@ class Folder:
         return name
 
     def drop_but(self, *names: str | None) -> None:
-        """Remove what was written earlier in this run, before a question was answered."""
+        """Remove obsolete files, written earlier in this run, except those named."""
         stale = self._passing - set(names)
         for old in stale:
             (self.path / old).unlink(missing_ok=True)
@@ -72,7 +80,7 @@ class Folder:
         return self
 
     def __exit__(self, *raised: object) -> None:
-        """Leave no empty folder behind when nothing came of the run."""
+        """Remove the folder, if the run created it, and its parent, if they are empty."""
         if self._made:
             with suppress(OSError):
                 self.path.rmdir()
@@ -80,13 +88,13 @@ class Folder:
 
 
 def write_files(folder: Folder, run: Run, film: Path | None = None) -> dict[str, str | None]:
-    """Write what there is; names relative to the folder, None for what there is not.
+    """Write the files of a run; return their names in the folder, None for those there are not.
 
     Args:
-        film: a file for the last deployment, beside the one in the folder.
+        film: another file for the film of the last deployment, besides the one in the folder.
 
     Raises:
-        StorageError: something cannot be written.
+        StorageError: a file cannot be written.
     """
     files: dict[str, str | None] = {
         "plan": None,
@@ -120,13 +128,16 @@ def write_files(folder: Folder, run: Run, film: Path | None = None) -> dict[str,
 
 
 def write_turn(folder: Folder, turn: int, run: Run, before: Plan | None) -> dict[str, str | None]:
-    """Write what a turn of a chat has changed; names as of `write_files`, with the turn's number.
+    """Write what a turn of a chat has changed, in files named by its number.
 
     Args:
-        before: the plan that stood then; arrows show who moves.
+        before: the plan to compare with; arrows show which robots move.
+
+    Returns:
+        Names as of `write_files`.
 
     Raises:
-        StorageError: something cannot be written.
+        StorageError: a file cannot be written.
     """
     files: dict[str, str | None] = dict.fromkeys(("plan", "picture", "animation", "trace"))
     picture, world, report = run.context.picture, run.world, run.report
@@ -149,13 +160,13 @@ def write_turn(folder: Folder, turn: int, run: Run, before: Plan | None) -> dict
 
 
 def _is_standing(folder: Folder, run: Run, node: PlanNode) -> bool:
-    """Whether a plan is of an earlier turn, not driven to in this one, and its files are there."""
+    """Return whether a plan is of an earlier turn, not driven to in this one, and has its files."""
     there = all((folder.path / name).exists() for name in ("plan.json", "plan.png"))
     return there and node is run.began.plans.get(node.plan.id) and run.report.arrival is None
 
 
 def draw_choices(run: Run) -> Any:
-    """The picture with what a question offers and nothing else."""
+    """Return the picture with only a question's choices drawn on it."""
     asked = [choice["id"] for choice in run.report.candidates or ()]
     targets = tuple(t for t in run.world.targets if t.id in asked)
     named = {t.id for t in targets}
@@ -165,16 +176,16 @@ def draw_choices(run: Run) -> Any:
 
 
 def film_file(path: Path | None) -> Path | None:
-    """Where a film goes; that it can is found out before robots move.
+    """Check, before robots move, that a film can be written to a path, and return the path.
 
     Raises:
-        InputError: no such folder, or another ending than of films.
+        InputError: its folder does not exist, or its suffix is not that of a film.
     """
     return _writable("--film", path, FILMS)
 
 
 def trajectory_file(path: Path | None) -> Path | None:
-    """Where trajectories go, likewise."""
+    """Check and return the path of a file of trajectories, as `film_file` does."""
     return _writable("--trajectories", path, (".json", ".csv"))
 
 
@@ -190,7 +201,11 @@ def _writable(option: str, path: Path | None, endings: Sequence[str]) -> Path | 
 def write_films(
     folder: Path, film: Path | None, context: Context, plan: Plan, title: str
 ) -> dict[str, str | None]:
-    """Write the last deployment of a plan as an animation, and where else a film is wanted."""
+    """Write the last deployment of a plan as an animation, and to `film` too if given.
+
+    Returns:
+        The names of the files written, `animation` in the folder and `film` as given.
+    """
     files: dict[str, str | None] = {}
     if animate(folder / "deploy.gif", context, plan, title):
         files["animation"] = "deploy.gif"
@@ -200,7 +215,7 @@ def write_films(
 
 
 def animate(path: Path, context: Context, plan: Plan, title: str) -> bool:
-    """Write the last deployment of a plan as a film; False when it was not deployed."""
+    """Write the last deployment of a plan as a film; return False if none was recorded."""
     arrival = context.world.arrivals.get(plan.id)
     if arrival is None or arrival.track is None:
         return False
@@ -214,7 +229,7 @@ def animate(path: Path, context: Context, plan: Plan, title: str) -> bool:
 
 
 def _fresh(parent: Path) -> Path:
-    """A folder named by the time that is not there yet."""
+    """Return a path, named by the time, that does not exist yet."""
     stem = datetime.now().astimezone().strftime("%Y-%m-%dT%H-%M-%S")
     names = (stem if i == 0 else f"{stem}-{i + 1}" for i in range(1_000))
     return next(parent / name for name in names if not (parent / name).exists())

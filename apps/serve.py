@@ -1,4 +1,4 @@
-"""`formup serve` and `formup tokens`: the team over HTTP, and who may reach it."""
+"""`formup serve` and `formup tokens`: serves the team over HTTP; manages who may reach it."""
 
 from collections.abc import Generator
 from contextlib import ExitStack, contextmanager
@@ -80,13 +80,13 @@ def serve(
 
 @contextmanager
 def service_of(settings: "ServerSettings", *rest: Any) -> Generator[Service]:
-    """The service of a server.
+    """Yield the service of a server.
 
     Args:
         rest: options of its agents, as `agent_of` takes them.
 
     Raises:
-        InputError: no session can be begun with such settings.
+        InputError: no session can begin with such settings.
     """
     check_settings(begun := settings.of_session())
     with ExitStack() as stack:
@@ -98,10 +98,10 @@ def service_of(settings: "ServerSettings", *rest: Any) -> Generator[Service]:
 
 
 def check_reach(settings: "ServerSettings") -> None:
-    """Refuse to listen to others without tokens.
+    """Refuse to listen beyond loopback without tokens.
 
     Raises:
-        InputError: saying so.
+        InputError: the host is not loopback and there are no tokens, or their file is missing.
     """
     if settings.host not in LOOPBACK and settings.tokens_file is None:
         raise InputError(
@@ -142,7 +142,7 @@ def remove(
 
 
 def _tokens(file: Path | None) -> "Tokens":
-    """The tokens of a file, or of the one in the user's data folder."""
+    """Return the tokens of a file, by default the server's or that of the user's data folder."""
     from .server.settings import ServerSettings
     from .server.tokens import Tokens
 

@@ -1,4 +1,4 @@
-"""`formup sessions`: conversations that were stored, listed, searched, read, forked, exported."""
+"""`formup sessions`: lists, searches, shows, renames, forks, exports and deletes conversations."""
 
 import json
 from collections.abc import Generator, Sequence
@@ -20,7 +20,7 @@ from .terminal import say
 from .trace import show_events
 
 LONGEST = 100
-"""Characters of a session's name and last words in a list."""
+"""Most characters of a session's name and words in a list."""
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 SessionId = Annotated[str, typer.Argument(metavar="ID", help="Of a session, as in the list.")]
@@ -79,10 +79,10 @@ def delete(session: SessionId, store: o.StoreUrl = None) -> None:
 
 
 def export(session: StoredSession, folder: Path) -> str:
-    """Write a session out in every form; where it is.
+    """Export a session in every format, and return a sentence that says where it is.
 
     Raises:
-        StorageError: the folder has one already, or it cannot be read or written.
+        StorageError: the folder has a session already, or one of them cannot be read or written.
     """
     export_folder(session, folder)
     written = (export_page(session, folder), export_json(session, folder))
@@ -91,7 +91,7 @@ def export(session: StoredSession, folder: Path) -> str:
 
 
 def list_words(found: Sequence[SessionFacts]) -> str:
-    """Sessions as lines."""
+    """Return sessions as text, one per line."""
     lines: list[str] = []
     for facts in found:
         when = datetime.fromisoformat(facts.created).astimezone().strftime("%Y-%m-%d %H:%M")

@@ -1,4 +1,4 @@
-"""`--starts FILE`: starting positions as spreadsheets, programs and people write them."""
+"""`--starts FILE`: starting positions, in the formats that spreadsheets and programs write."""
 
 import json
 import re
@@ -17,13 +17,14 @@ FORM = "give x,y a line (x;y where commas are decimal), or JSON [[x, y], ...], i
 
 
 def starts(path: Path | None) -> tuple[Point, ...] | None:
-    """Starting positions (x, y), px, from JSON [[x, y], ...] or a table of two columns.
+    """Read starting positions (x, y), px, from JSON [[x, y], ...] or a table of two columns.
 
-    A table may have lines of comment (#), a first line that names its columns (in either order),
-    and semicolons, tabs or blanks for commas; beside semicolons and tabs a comma is a decimal one.
+    A table may have comment lines (#), a header line that names its columns, in either order, and
+    semicolons, tabs or blanks in place of commas; with semicolons or tabs, a comma is a decimal
+    point.
 
     Raises:
-        InputError: it cannot be read, or holds anything but finite pairs.
+        InputError: the file cannot be read, or holds anything but pairs of numbers in range.
     """
     if path is None:
         return None

@@ -18,11 +18,11 @@ from ..tools.tool import violations
 from .arguments import Things
 
 Who = tuple[str | StatedContract, str | None]
-"""The model that decides, and its planner."""
+"""The model that decides, or the contract in its place, and its planner."""
 CANDIDATE = re.compile(r'(?<!"text":)(?<!"text": )"(c[1-9][0-9]{0,3})"')
 
 
-def decided(
+def resolve_decider(
     path: Path | None,
     pointed: Things,
     kept: Things,
@@ -32,15 +32,15 @@ def decided(
     planner: str | None,
     picture: Picture,
 ) -> tuple[Who, SayOptions]:
-    """Who decides, and about what: the contract of a file if there is one, else the model.
+    """Return who decides, and about what: a file's contract if one is given, else the model.
 
     Args:
         kept: what no robot may enter; a contract may name it as k1, k2, ...
-        picture: whose file may say its scale.
+        picture: its file may state its scale.
 
     Raises:
-        InputError: the file cannot be read, contradicts what else is given, or names what nothing
-            points at.
+        InputError: the file cannot be read, contradicts the other options, or names a thing that
+            nothing points at.
     """
     if path is None:
         return (model, planner), SayOptions(pointed=pointed, keep_out=kept, settings=settings)
@@ -73,7 +73,7 @@ def decided(
 
 
 def _read(path: Path, pointed: Things) -> tuple[Contract, Things]:
-    """The contract of a file and what it is about; the candidates it names become t1, t2, ..."""
+    """Read a contract and the things it is about; new candidates in it continue t1, t2, ..."""
     text = read_text(path)
     ids = {p.candidate: p.id for p in pointed if p.candidate is not None}
     named = [c for c in dict.fromkeys(CANDIDATE.findall(text)) if c not in ids]

@@ -1,4 +1,4 @@
-"""Pictures in a terminal: by kitty's protocol or sixels where it says it can, else half blocks."""
+"""Pictures in a terminal: kitty's protocol or sixels if it says it can, otherwise half blocks."""
 
 import base64
 import os
@@ -21,21 +21,21 @@ from .terminal import draw
 
 Way = Literal["kitty", "sixel", "blocks", "none"]
 Names = Mapping[str, tuple[float, float]]
-"""Short texts and where they stand, as shares of the picture's width and height."""
+"""Short labels and their places, as fractions of the picture's width and height."""
 PATIENCE = 0.5
-"""Seconds a terminal has to say what it can; most take a thousandth of that."""
+"""Seconds to wait for a terminal to say what it supports; most take a thousandth of that."""
 WIDEST, CELL = 100, (8, 16)
-"""Columns a picture takes at most; pixels of a cell where the terminal does not say."""
+"""Most columns of a picture; assumed size of a cell, pixels."""
 WRITTEN = Style(color=Color.from_rgb(255, 255, 255), bgcolor=Color.from_rgb(0, 92, 184), bold=True)
 CHUNK = 4096
 KITTY, SIXEL = re.compile(rb"\x1b_Gi=31;OK"), re.compile(rb"\x1b\[\?(?:\d+;)*4(?:;\d+)*c")
 ENDS = re.compile(rb"\x1b\[\?[\d;]*c")
 ASK = "\x1b_Gi=31,s=1,v=1,a=q,t=d,f=24;AAAA\x1b\\\x1b[c"
-"""May I send a picture by kitty's protocol; and, which any terminal answers, what are you?"""
+"""Asks whether kitty's protocol works, then for the device attributes, which all terminals send."""
 
 
 def way_of_terminal(console: Console) -> Way:
-    """How the terminal shows pictures, by its own answer."""
+    """Ask the terminal how it can show pictures, and return the best way."""
     if not console.is_terminal or console.is_dumb_terminal or console.color_system is None:
         return "none"
     said = _identity()
@@ -52,9 +52,9 @@ def show_picture(
     """Show a picture in the terminal.
 
     Args:
-        page: as it is in the file.
-        small: draws it anew for few pixels, given the greatest width and height.
-        names: what is written into that.
+        page: the picture as it is in the file, shown by kitty's protocol and sixels.
+        small: draws it anew for half blocks, given the largest width and height in pixels.
+        names: labels to write over the half blocks.
     """
     columns, rows = min(console.width, WIDEST), max(console.height * 2 // 3, 8)
     if way == "blocks":
@@ -66,7 +66,7 @@ def show_picture(
 
 
 class _HalfBlocks:
-    """Two pixels a cell, the upper one in the colour of the letter, and names over them."""
+    """A picture of two pixels per cell, the upper one as a coloured ▀, with labels over it."""
 
     def __init__(self, image: Image.Image, names: Names) -> None:
         self._pixels = np.asarray(image.convert("RGB"))
@@ -105,7 +105,7 @@ def _kitty(image: Image.Image) -> str:
 
 
 def _sixels(image: Image.Image) -> str:
-    """Bands of six rows, a pass for each colour in a band."""
+    """Encode an image as sixels: bands of six rows, with a pass for each colour in a band."""
     flat = image.convert("RGB").quantize(255)
     pixels, palette = np.asarray(flat), np.array(flat.getpalette()).reshape(-1, 3)
     shares = (palette * 100 / 255).round().astype(int).tolist()
@@ -120,14 +120,14 @@ def _sixels(image: Image.Image) -> str:
 
 
 def _runs(columns: np.ndarray) -> str:
-    """Columns of six pixels as letters, equal neighbours counted."""
+    """Encode columns of six pixels as letters, with a count for runs of more than three."""
     starts = np.concatenate([[0], np.flatnonzero(np.diff(columns)) + 1, [len(columns)]])
     runs = zip(columns[starts[:-1]].tolist(), np.diff(starts).tolist(), strict=True)
     return "".join(f"!{n}{chr(63 + c)}" if n > 3 else chr(63 + c) * n for c, n in runs)
 
 
 def _identity() -> bytes:
-    """What the terminal answers."""
+    """Return the terminal's answer to `ASK`; empty if it cannot be asked."""
     try:
         import termios
         import tty

@@ -1,4 +1,4 @@
-"""A run at the command line: shown, its files written, the person's answers given to it."""
+"""A run at the command line: shows it, writes its files, passes the person's answers to it."""
 
 from pathlib import Path
 
@@ -16,16 +16,16 @@ from .run_files import Folder, write_files
 from .terminal import say
 
 MOST_ANSWERS = 5
-"""Questions answered in one run at a terminal."""
+"""Most questions that one run asks at a terminal."""
 
 
 class TerminalSession:
-    """Where a person meets a run.
+    """The front end of a run at a terminal.
 
     Args:
-        agent: goes on with it.
+        agent: goes on with the run.
         folder: for its files.
-        as_json: whether a program reads, which is not asked anything.
+        as_json: whether a program reads the output; it is not asked anything.
         record: a file for a copy of the trace, if wanted.
         film: a file for a film of the robots, if wanted.
     """
@@ -43,14 +43,14 @@ class TerminalSession:
 
     @property
     def can_ask(self) -> bool:
-        """Whether somebody is there to answer."""
+        """Whether a person is there to answer."""
         return not self._as_json and at_terminal()
 
     def serve(self, run: Run) -> int:
-        """Show what came of a run, and go on as long as a person answers.
+        """Show a run's report, and go on with the run as long as a person answers.
 
         Returns:
-            What to exit with.
+            The exit code.
         """
         report = self._show(run)
         for _ in range(MOST_ANSWERS if self.can_ask else 0):
@@ -74,7 +74,7 @@ class TerminalSession:
         except InputError as error:
             if report.arrival is None:
                 raise
-            # Robots have moved: that is what has to be reported, whatever the disk says.
+            # Robots have moved, which must be reported even if the files cannot be written.
             text = f"{report.message} Files are missing: {error}"
             report = report.model_copy(update={"message": text})
         if self._as_json:

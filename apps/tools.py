@@ -1,4 +1,4 @@
-"""`formup tools list` and `formup tools call`: any one tool by hand."""
+"""`formup tools`: lists the tools, prints schemas, and calls any one tool by hand."""
 
 import asyncio
 import io
@@ -71,7 +71,7 @@ def call_tool(
         called = tool.call(replace(context, observed=observed.append), arguments)
         result = asyncio.run(called)
     except (ToolError, FleetError, KeyboardInterrupt) as error:
-        if metres_per_pixel is None and observed:  # another scale is not kept if it was refused
+        if metres_per_pixel is None and observed:  # a new scale is not stored after a refusal
             _save(observed[-1], context, state)  # such as a partial plan, or where robots stopped
         if isinstance(error, ToolError):
             raise InputError(str(error)) from None
@@ -90,7 +90,7 @@ def call_tool(
 
 
 def _draw(path: Path, context: Context, world: World) -> Path:
-    """The current plan on the picture as a PNG file, or what has been measured."""
+    """Draw the latest plan, or else what has been measured, on the picture; write it as PNG."""
     node, file = world.plans.get(next(reversed(world.plans), "")), io.BytesIO()
     drawn = draw_look(context.picture, world)
     if node is not None:

@@ -1,4 +1,4 @@
-"""`formup trace FILE`: a run as it went, for reading."""
+"""`formup trace FILE`: prints what happened in a run, for a person to read."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -18,9 +18,9 @@ from .run_display import STATUS_STYLE
 from .terminal import styled, under
 
 LONGEST = 300
-"""Characters shown of one text; the trace has all of it."""
+"""Most characters shown of one text; the trace has all of it."""
 COLUMN = 8
-"""Where they begin."""
+"""The column where texts begin."""
 
 
 def show_trace(file: o.TraceFile) -> None:
@@ -37,15 +37,15 @@ def show_trace(file: o.TraceFile) -> None:
 def show_events(
     events: Sequence[Event], where: Callable[[str], str], name: str, how_on: str
 ) -> None:
-    """Show the events of a session.
+    """Print the events of a session.
 
     Args:
-        where: a picture with a hash is.
-        name: what the session is called in an error.
-        how_on: how one goes on with it where it was broken off.
+        where: returns the place of a picture, given its hash.
+        name: what an error calls the session.
+        how_on: says how to go on with the session if it broke off.
 
     Raises:
-        InputError: they are damaged.
+        InputError: the events are damaged.
     """
     try:
         _show(where, how_on, *events)
@@ -70,7 +70,7 @@ def _show(where: Callable[[str], str], how_on: str, start: Event, *events: Event
 
 
 def _steps(events: Sequence[Event], where: Callable[[str], str]) -> Table:
-    """A row for each message, with the time since the one before and what it cost, if anything."""
+    """Return a table of messages, each with the time since the one before, and any cost."""
     counts = any(any(_spent(event.data)) for event in events)
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="cyan")
     for title in ("at", "took", "tokens", "USD") if counts else ("at", "took"):
@@ -98,7 +98,7 @@ def _spent(message: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _step(message: Mapping[str, Any], where: Callable[[str], str]) -> list[Text]:
-    """A message as lines: who, what it says, calls, pictures."""
+    """Return a message as lines: its author and text, its calls, its pictures."""
     lines: list[Text] = []
     text = _short(message.get("text", ""))
     if message["role"] == "user":

@@ -1,7 +1,7 @@
-"""`--watch`: a window in which robots are seen while they drive, and their time is controlled.
+"""`--watch`: a window that shows robots while they drive, and controls their time.
 
-It is drawn in the thread of the event loop, which has to be the main one for SDL, between steps;
-at most 30 times a second, with rests as long as it takes, so that robots are not slower for it.
+It is drawn in the thread of the event loop, which for SDL has to be the main one, between steps:
+at most 30 times a second, and with rests as long as drawing takes, so as not to slow robots down.
 """
 
 import asyncio
@@ -33,24 +33,25 @@ if TYPE_CHECKING:
 
 Draw = Callable[..., Image.Image]
 FRAME, REST = 1 / 30, 0.1
-"""Least seconds from one frame to the next, and the longest rest after one that took long."""
+"""Least seconds from one frame to the next, and the longest rest after a slow frame."""
 SIZE, ROW = (1230, 760), 21
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, None)
-"""Simulated seconds a second; None for as many as can be computed."""
+"""Simulated seconds per second; None for as many as can be computed."""
 ZOOM, PAN = 1.25, 60
 NUMBERED, TRAILED, BANDS = 60, 400, 4
-"""Up to so many robots bear numbers and lines to their places; up to so many leave trails."""
+"""Most robots shown with numbers and lines to places; most with trails; bands of a fading trail."""
 INSIDE, BESIDE = 10.0, 22.0
-"""A number stands in a body of this radius, else beside it where no robot is as near as this."""
+"""Least radius, px, of a body with its number inside; else least distance, px, to the next robot
+for a number beside it."""
 HEADLESS = ("dummy", "offscreen")
-"""SDL's drivers that show nothing."""
+"""SDL drivers that show nothing."""
 TIME = (("Space", "pause, go on"), (".", "one step"), ("+  -", "faster, slower"))
 VIEW = (("wheel, I O", "zoom in, out"), ("drag, arrows", "move the picture"), ("F", "all of it"))
 KEYS = len(TIME) + len(VIEW) + 1
 
 
 class Window:
-    """A window for one drive after another."""
+    """A window that shows one drive after another."""
 
     def __init__(self) -> None:
         import pygame
@@ -84,12 +85,12 @@ class Window:
             self._course.ended = self._changed = True
 
     def stay(self) -> None:
-        """Stay until a person closes it; where nobody can see it, not at all."""
+        """Stay open until a person closes the window; return at once if nobody can see it."""
         while self._open and self._pygame.display.get_driver() not in HEADLESS and self._turn():
             time.sleep(FRAME)
 
     def close(self) -> None:
-        """Take it off the screen."""
+        """Close the window."""
         self._open = False
         self._pygame.display.quit()
 
@@ -99,7 +100,7 @@ class Window:
             self._changed = True
 
     async def _serve(self) -> None:
-        """Draw, and do what a person wants; robots that nobody watches any more are held."""
+        """Draw and handle input until the window is closed, then hold robots that still drive."""
         while self._open and self._turn():
             await asyncio.sleep(max(FRAME - self._took, min(self._took, REST)))
         self.close()
@@ -110,14 +111,14 @@ class Window:
         except FleetError as error:
             say(f"formup: the robots could not be held: {error}", error=True)
         if self._pace is not None:
-            self._pace.paused = False  # a step that waits would not learn of it
+            self._pace.paused = False  # a step that waits would never see the stop
 
     def _turn(self) -> bool:
-        """Do what a person wants, and draw where something has changed; False to close it."""
+        """Handle input, and draw if anything has changed; return False to close the window."""
         began = time.perf_counter()
         for event in self._pygame.event.get():
             self._changed = True
-            if not self._heed(event):
+            if not self._handle_event(event):
                 return False
         if self._changed and self._course.poses:
             self._changed = False
@@ -126,8 +127,8 @@ class Window:
         self._took = time.perf_counter() - began
         return True
 
-    def _heed(self, event: "Event") -> bool:
-        """Do what an event asks for; False where it is to close the window."""
+    def _handle_event(self, event: "Event") -> bool:
+        """Handle an event; return False if it closes the window."""
         pygame, ground = self._pygame, self._ground
         if event.type == pygame.MOUSEWHEEL:
             ground.zoom(ZOOM**event.y, pygame.mouse.get_pos())
@@ -147,7 +148,7 @@ class Window:
         return event.type != pygame.QUIT
 
     def _set(self, pace: Pace, typed: str) -> None:
-        """Do what a key says about time."""
+        """Handle a key that controls time."""
         if typed == " ":
             pace.paused = not pace.paused
         elif typed == ".":
@@ -172,7 +173,7 @@ class Window:
         self._draw_figures(screen)
 
     def _draw_ways(self, screen: "Surface") -> None:
-        """Where robots came from, fading, and where they go."""
+        """Draw fading trails behind robots, lines to their places, a followed thing's outline."""
         course, draw, at = self._course, self._pygame.draw, self._ground.canvas.at
         trail = np.stack([at(points) for points in course.trail])
         links = [at(link) for link in course.links if len(course.links) <= NUMBERED]
@@ -229,7 +230,7 @@ class Window:
             self._put(screen, np.array([left + 105, y]), words, meaning, MUTED, side=0)
 
     def _put(self, screen: "Surface", at: Any, draw: Draw, *how: Any, side: float = 0.5) -> None:
-        """Put what is drawn so on a point of the page: its middle, or its left or right side."""
+        """Put a drawing on a point of the page, by its left edge, middle or right (0, 0.5, 1)."""
         surface = _sprite(draw, how)
         (x, y), (wide, high) = at, surface.get_size()
         screen.blit(
@@ -239,7 +240,7 @@ class Window:
 
 @lru_cache(maxsize=2000)
 def _sprite(draw: Draw, how: tuple[Any, ...]) -> "Surface":
-    """An image as what is put on the screen."""
+    """Return a drawn image as a surface for the screen."""
     import pygame
 
     image = draw(*how)
@@ -250,12 +251,12 @@ def _sprite(draw: Draw, how: tuple[Any, ...]) -> "Surface":
 
 @contextmanager
 def watching(wanted: bool, *, stays: bool = True) -> Generator[Services]:
-    """Services whose robots are shown in a window where that is wanted.
+    """Yield services that show robots in a window, if wanted.
 
-    Where there is no display, that is said, and the films have to do.
+    Without a display, a note refers to the films instead.
 
     Args:
-        stays: whether a person closes it once the command is done.
+        stays: whether the window stays after the command until a person closes it.
 
     Raises:
         InputError: the library is not installed.
@@ -267,7 +268,7 @@ def watching(wanted: bool, *, stays: bool = True) -> Generator[Services]:
     services.view = window.follow
     try:
         yield services
-    except typer.Exit:  # the command has done what it should
+    except typer.Exit:  # the command has finished
         if stays:
             window.stay()
         raise
@@ -276,7 +277,7 @@ def watching(wanted: bool, *, stays: bool = True) -> Generator[Services]:
 
 
 def _window() -> Window | None:
-    """A window that is not shown yet; None where there is no display."""
+    """Return a window that is still hidden; None, with a note, if it cannot be opened."""
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # stdout is for reports
     os.environ.setdefault("SDL_NO_SIGNAL_HANDLERS", "1")
     try:
@@ -286,7 +287,7 @@ def _window() -> Window | None:
     chosen, why = "SDL_VIDEODRIVER" in os.environ, "this machine has no display"
     screens = os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}
     try:
-        if sys.platform != "linux" or screens:  # SDL complains on its own where there is none
+        if sys.platform != "linux" or screens:  # without one, SDL prints its own complaint
             pygame.display.init()
         if pygame.display.get_init() and (chosen or pygame.display.get_driver() not in HEADLESS):
             pygame.display.set_mode(SIZE, pygame.HIDDEN)

@@ -1,1 +1,1 @@
-"""How fast it is, measured beside the bare library calls; not part of the wheel."""
+"""Benchmarks of formup beside the bare library calls; not part of the wheel."""

@@ -1,7 +1,7 @@
 """`make bench`: CPU time of each tool on a 2-megapixel photograph beside the bare library calls.
 
-The bare call is the part no implementation of the tool could do without, made directly with
-OpenCV, shapely, scipy or Pillow on the same data; the ratio is what formup adds around it.
+The bare calls are the part that no implementation of the tool could do without, made directly with
+OpenCV, shapely, scipy or Pillow on the same data; the ratio shows what formup adds around them.
 """
 
 import asyncio
@@ -33,7 +33,7 @@ SIZE = (1920, 1080)
 REPEATS = 5
 ROBOTS, PROBES = 24, 1000
 SIDES = (0.25, 0.5, 1, 2)
-"""Sides of the pictures for the growth, by those of SIZE."""
+"""Sides of the pictures used to measure growth, as fractions of those of SIZE."""
 TEAMS = (6, 24, 96)
 FINDING = "k-means, 150 thresholds at 384 px, contours"
 RING = "shapely buffer, interpolate"
@@ -43,7 +43,7 @@ PLACING = ("sample_along_edges", "sample_inside", "sample_shape", "propose_forma
 
 
 class Case(NamedTuple):
-    """A tool with its arguments, and the bare library calls in words and as a function."""
+    """A tool with its arguments, and the bare library calls, described and as a function."""
 
     tool: str
     arguments: dict[str, Any]
@@ -52,7 +52,7 @@ class Case(NamedTuple):
 
 
 def rows() -> Iterator[str]:
-    """The table and how the times grow."""
+    """Yield the table, then how the times grow with pixels and robots."""
     context = _with_plan(_with_targets(SIZE))
     yield f"{SIZE[0]} x {SIZE[1]} px, CPU milliseconds, best of {REPEATS}"
     yield heading("tool", "bare calls")
@@ -76,12 +76,12 @@ def _growth(
 
 def _timed(context: Context, case: Case) -> float:
     tool = next(t for t in TOOLS if t.name == case.tool.partition(" ")[0])
-    searched = tool.name == "locate_object"  # elsewhere the picture has been searched before
+    searched = tool.name == "locate_object"  # the others reuse an earlier search
     return best(lambda: asyncio.run(tool.call(_anew(context, searched), case.arguments)), REPEATS)
 
 
 def _anew(context: Context, searched: bool) -> Context:
-    """The context with nothing in it that was computed and cached by an earlier call.
+    """Return the context without anything that an earlier call computed and cached.
 
     Args:
         searched: whether the call has to find the candidates in the picture anew.
@@ -96,7 +96,10 @@ def _anew(context: Context, searched: bool) -> Context:
 
 
 def _with_targets(size: tuple[int, int]) -> Context:
-    """The two cars at a width and height, px, the red one segmented as t1, the other as t2."""
+    """Return the picture of two cars at a size (w, h), px, with the red one as t1, the other as t2.
+
+    Both are segmented.
+    """
     path = PHOTOS / "images" / "cars_two.jpg"
     task = next(t for t in load_suite("photos").tasks if t.picture == path and len(t.things) == 2)
     photo = load_picture(path)
@@ -112,14 +115,14 @@ def _with_targets(size: tuple[int, int]) -> Context:
 
 
 def _after(context: Context, name: str, arguments: dict[str, Any]) -> Context:
-    """The context after a call of a tool."""
+    """Return the context after a call of a tool."""
     tool = next(t for t in TOOLS if t.name == name)
     world = asyncio.run(tool.call(context, arguments)).world
     return context if world is None else context.at(world)
 
 
 def _with_plan(context: Context, robots: int = ROBOTS) -> Context:
-    """The context with a plan around the red car."""
+    """Return the context with a plan around the red car."""
     return _after(context, "propose_formation", {"contract": {"groups": [_group(robots)]}})
 
 
@@ -192,7 +195,7 @@ def _bare_segment(context: Context, box: list[int]) -> object:
 
 
 def _bare_candidates(context: Context) -> int:
-    """The regions of every threshold of three channels and of the distances to nine colours."""
+    """Count the contours at every threshold of three channels and of distances to nine colours."""
     small = cv2.resize(context.picture.pixels[::2, ::2], (384, 216))
     smooth = np.asarray(cv2.bilateralFilter(small, 7, 40, 5), dtype=np.float32)
     lab = np.asarray(cv2.cvtColor(smooth / 255, cv2.COLOR_RGB2LAB), dtype=np.float32)

@@ -1,7 +1,7 @@
-"""Who takes which place: CPU time and cost beside the bare SciPy call, and growth with N.
+"""Assignment of robots to places: CPU time and cost beside bare SciPy, and growth with N.
 
-The bare call is `linear_sum_assignment` of the squared distances of sets with one centre, as
-anyone would write it. Where that takes minutes the proven bound of the gap stands for the optimum.
+The bare call is `linear_sum_assignment` on squared distances, the sets' centres aligned, as anyone
+would write it. Where that would take minutes, the proven bound of the gap stands in for it.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,9 +16,9 @@ from ..tools.geometry.outline import FloatArray
 from .growth import best, growth, peak, show
 
 PITCH = 10.0
-"""Distance of neighbours in the block robots start from, px."""
+"""Distance between neighbours in the block that robots start from, px."""
 BARE_MOST = 5_000
-"""Robots for which the bare call is made: ten seconds or so."""
+"""Most robots for which the bare call is made; it takes ten seconds or so."""
 SIZES = (2_500, 5_000, 10_000, 20_000)
 REPEATS = 1
 Team = Callable[[int], tuple[FloatArray, FloatArray]]
@@ -35,7 +35,7 @@ CASES = (
 
 
 def rows() -> Iterator[str]:
-    """A table of cases, the growth of time with N, and the memory of the approximation."""
+    """Yield a table of cases, then how time and memory grow with N."""
     yield f"{'case':38} {'CPU s':>7} {'bare s':>7} {'method':>12} {'above bare':>11} {'gap':>9}"
     for name, n in CASES:
         yield _case(name, n)
@@ -50,7 +50,10 @@ def rows() -> Iterator[str]:
 
 
 def distant(n: int) -> tuple[FloatArray, FloatArray]:
-    """A square block and a disc of as many random places, twice the block's side away."""
+    """Return a square block of robots, and a disc of random places, 1.5 of the block's sides away.
+
+    Both are (n, 2), px.
+    """
     side = int(np.ceil(n**0.5))
     cells = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
     rng = np.random.default_rng(0)
@@ -62,13 +65,13 @@ def distant(n: int) -> tuple[FloatArray, FloatArray]:
 
 
 def overlapping(n: int) -> tuple[FloatArray, FloatArray]:
-    """Random robots and random places all over the same square: nothing is gained by aligning."""
+    """Return random robots and places in one square, (n, 2) px, where aligning gains nothing."""
     rng, side = np.random.default_rng(0), PITCH * n**0.5
     return rng.uniform(0, side, (n, 2)), rng.uniform(0, side, (n, 2))
 
 
 def block_to_ring(n: int, away: float = 0.0) -> tuple[FloatArray, FloatArray]:
-    """A square block and a ring about it, or as far away as some of its sides."""
+    """Return a square block and a ring about it, (n, 2) px, moved `away` times the block's side."""
     block, _ = distant(n)
     side = PITCH * np.ceil(n**0.5)
     angle = np.arange(n) / n * 2 * np.pi

@@ -1,7 +1,7 @@
 """CPU seconds from a large picture's file to the plan and its picture, beside decoding the file.
 
-As `formup run BIG "Surround the car" --box ... -n 8 --plan-only` works, the interpreter's start and
-imports not counted.
+It does what `formup run BIG "Surround the car" --box ... -n 8 --plan-only` does; the start of the
+interpreter and imports are not counted.
 """
 
 import time
@@ -23,15 +23,15 @@ from .growth import show
 
 PHOTO = PHOTOS / "images" / "cars_two.jpg"
 BOX = np.array((320, 125, 470, 405)) / 768
-"""Around the red car, in widths of the photograph."""
+"""Box around the red car, as fractions of the photograph's width."""
 SIZES = {"12 MP": (4000, 3000), "50 MP": (8660, 5770)}
 NOISE = 3.0
-"""Standard deviation of a camera's noise, without which a picture is compressed too well."""
+"""Standard deviation of camera noise, without which the picture would compress too well."""
 REPEATS = 3
 
 
 def rows() -> Iterator[str]:
-    """The table."""
+    """Yield the table."""
     with TemporaryDirectory() as folder:
         place = Path(folder)
         _seconds_planned(PHOTO, place / "warm")
@@ -49,7 +49,7 @@ def rows() -> Iterator[str]:
 
 
 def _enlarged(file: Path, size: tuple[int, int]) -> Path:
-    """The photograph enlarged, with noise."""
+    """Write the photograph to a file, enlarged and with noise added."""
     large = cv2.resize(load_picture(PHOTO).pixels, size, interpolation=cv2.INTER_CUBIC)
     noise = np.random.default_rng(0).normal(0, NOISE, (*large.shape[:2], 1)).astype(np.float32)
     pixels = np.clip(large + noise, 0, 255).astype(np.uint8)

@@ -1,8 +1,8 @@
 """`python -m formup.benchmarks.bench_cages`: CPU time of the tests that prove a cage.
 
-Beside each stand the bare library calls it could not do without: of the disc test the inscribed
-disc, a triangulation and distances; of the flood one look-up of every robot in every cell of its
-first grid halved once, and one labelling of what is free.
+Beside each are the bare library calls that it needs at least: for the disc test, the inscribed
+disc, a triangulation and distances; for the flood, one look-up of every robot in every cell of its
+first grid, halved once, and one labelling of the free cells.
 """
 
 import itertools
@@ -32,11 +32,11 @@ VERTICES = (60, 300, 1500, 4500)
 ELL = ((0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3))
 TABLE = 192
 COPIES = 40
-"""As many bodies, each a little aside, so that nothing is kept from the call before."""
+"""Number of bodies, each slightly shifted, so that no call can reuse a cached result."""
 
 
 def rows() -> Iterator[str]:
-    """The tables."""
+    """Yield the tables."""
     region = make_outline(np.asarray(ELL) * SIZE + 300).filled
     yield f"CPU milliseconds, best of {REPEATS}; disc: 60 corners; flood: an L of 6 corners"
     yield heading("test", "state")
@@ -54,7 +54,7 @@ def rows() -> Iterator[str]:
 
 
 def _growths(region: Polygon) -> Iterator[str]:
-    """One level of the flood, the disc test of ten robots."""
+    """Yield how one level of the flood and the disc test of ten robots grow."""
 
     def crowd(n: int) -> Work:
         return _level(region, _around(region, n))
@@ -92,7 +92,7 @@ def _level(region: Polygon, robots: FloatArray) -> Work:
 
 
 def _disc(region: Polygon, n: int) -> tuple[float, float, str]:
-    """Milliseconds of the disc test and of the bare calls, and what the test says."""
+    """Return milliseconds of the disc test and of the bare calls, and the test's result."""
     robots = _around(region, n)
     moved = [(translate(region, x), robots + np.array([x, 0.0])) for x in np.arange(COPIES) / 8]
     turn, again = itertools.cycle(moved), itertools.cycle(moved)

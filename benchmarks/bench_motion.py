@@ -1,7 +1,7 @@
-"""`python -m formup.benchmarks.bench_motion`: motions of seeded scenes, planned, certified, driven.
+"""`python -m formup.benchmarks.bench_motion`: plans, certifies and drives motions of seeded scenes.
 
-Their makespan beside a bound that no robots can beat, teams of 1,000 and 10,000, robots that are
-late or stop for good, and pyrvo on the same scenes. Seconds are CPU seconds of this machine.
+It compares makespans with a bound that no robots can beat, tries teams of up to 10,000, and robots
+that are late or stop for good, and runs pyrvo on the same scenes. Seconds are CPU seconds.
 """
 
 import argparse
@@ -37,15 +37,15 @@ PARTS = ("scenes", "large", "late", "pyrvo")
 SIZES, ORCA_SIZES, LARGE = (8, 30, 100, 300), (8, 30, 100), (300, 1_000, 3_000, 10_000)
 LATE_SCENES, LATE_MOST = 2_000, 100
 INSIDE = 12
-"""A seed whose formation has room for any number of robots: inside a square."""
+"""A seed whose formation, inside a square, has room for any number of robots."""
 MOST_SECONDS = 600.0
-"""How long a large team may take by the clock."""
+"""Longest wall time, in seconds, that a large team may take."""
 PHYSICS = Physics(speed=SPEED, acceleration=SPEED / FULL_SPEED_S, radius=RADIUS, slip=SLIP)
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A motion with its certificate, who takes which place, and CPU seconds."""
+    """A motion with its certificate, the robot of each place, and CPU seconds."""
 
     motion: Motion
     robots: tuple[str, ...]
@@ -58,7 +58,7 @@ def planned(of: Scene, error: float) -> Planned:
     """Assign robots to the places, plan their motion, and check it.
 
     Args:
-        error: how far robots may come off their paths, px.
+        error: how far robots may deviate from their paths, px.
 
     Raises:
         FleetError: no motion is found.
@@ -73,7 +73,7 @@ def planned(of: Scene, error: float) -> Planned:
 
 
 def bound(of: Scene) -> float:
-    """Seconds that robots take at least: the bottleneck assignment over shortest ways, px."""
+    """Return a lower bound of the makespan, s: the bottleneck assignment over shortest paths."""
     frame = of.site.frame(RADIUS)
     ways = way_lengths(of.starts, of.goals, of.ground.solid, RADIUS, frame)
     lengths = np.unique(ways)
@@ -89,7 +89,15 @@ def bound(of: Scene) -> float:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a scene; `why` it failed, or nothing."""
+    """The result of a scene; `why` says why it failed, or is empty.
+
+    Attributes:
+        separation: least distance of robots in the plan, as a fraction of two radii.
+        seen: the same, as observed while they drove.
+        clearance: least distance from obstacles in the plan, as a fraction of a radius.
+        over_bound: makespan as a multiple of `bound`.
+        planning: CPU seconds; `checking` likewise.
+    """
 
     why: str
     arrived: bool = False
@@ -130,7 +138,7 @@ def measured(of: Scene) -> Outcome:
 
 
 def scene_rows(sizes: Sequence[int], seeds: range) -> Iterator[str]:
-    """By numbers of robots: how many scenes are complete, and their figures."""
+    """Yield, for each number of robots, how many scenes are complete, and their figures."""
     yield f"{len(seeds)} scenes of each number of robots; figures are medians / worst"
     yield (
         f"{'robots':>6} {'complete':>8} {'arrived':>7} {'apart/2r':>8} {'driven':>6} "
@@ -158,7 +166,7 @@ def _median_and_worst(values: Sequence[float]) -> str:
 
 
 def _plan_large(robots: int, to: Connection) -> None:
-    """In a process of its own: seconds and MiB that a team takes, and what came of it."""
+    """Run in a process of its own, and send a team's seconds, MiB and result, or why it failed."""
     of = scene(INSIDE, robots, "random")
     before = getrusage(RUSAGE_SELF).ru_maxrss
     try:
@@ -171,7 +179,7 @@ def _plan_large(robots: int, to: Connection) -> None:
 
 
 def large_rows(sizes: Sequence[int], most: float = MOST_SECONDS) -> Iterator[str]:
-    """Teams that start anywhere, once each, and how time and memory grow."""
+    """Yield teams that start anywhere, once each, and how their time and memory grow."""
     yield f"{'robots':>6} {'planning s':>10} {'checking s':>10} {'MiB':>7} {'apart/2r':>8}"
     figures: dict[int, tuple[float, float, float]] = {}
     for n in sizes:
@@ -208,12 +216,12 @@ def large_rows(sizes: Sequence[int], most: float = MOST_SECONDS) -> Iterator[str
 
 
 def late_rows(seeds: range, most: int = LATE_MOST) -> Iterator[str]:
-    """Robots that are late, and in every second scene some that stop for good."""
+    """Yield how scenes end with robots that are late, and, in every second one, some that stop."""
     ends: list[Late] = []
     failed: list[str] = []
     for seed in seeds:
         random = np.random.default_rng([seed, most])
-        robots = round(3 * (most / 3) ** (random.random() ** 2))  # small ones mostly
+        robots = round(3 * (most / 3) ** (random.random() ** 2))  # mostly small teams
         try:
             made = planned(scene(seed, robots), tracking_error(PHYSICS))
         except FleetError as error:
@@ -234,7 +242,7 @@ def late_rows(seeds: range, most: int = LATE_MOST) -> Iterator[str]:
 
 
 def orca_rows(sizes: Sequence[int], seeds: range) -> Iterator[str]:
-    """The same scenes with pyrvo, robots and ways to their places being the same."""
+    """Yield formup and pyrvo on the same scenes, with the same robots and ways to their places."""
     if find_spec("pyrvo") is None:
         yield "pyrvo is not installed: not measured beside"
         return
@@ -268,7 +276,7 @@ def orca_rows(sizes: Sequence[int], seeds: range) -> Iterator[str]:
 
 
 def main() -> None:
-    """Print the tables that are asked for."""
+    """Print the tables that the command line asks for."""
     parser = argparse.ArgumentParser(description="How teams get to their places.")
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; else all of them")
     parser.add_argument("--scenes", type=int, default=100, help="of each number of robots")

@@ -1,6 +1,6 @@
-"""How much a broker carries: robots that all drive at once, what is lost, and how late it comes.
+"""The load an MQTT broker carries when all robots drive at once: messages lost, and latency.
 
-Three processes: mosquitto, the robots, the fleet that drives them. All messages go at QoS 0.
+There are three processes: mosquitto, the robots, and the fleet that drives them, all at QoS 0.
 `python -m formup.benchmarks.bench_mqtt [ROBOTS [SECONDS]]`
 """
 
@@ -34,28 +34,28 @@ BROKER = "allow_anonymous true\nset_tcp_nodelay true\n"
 
 
 class Counted:
-    """Numbers of messages by robot, of which none may be left out."""
+    """Sequence numbers of messages by robot, to find those lost, and the latencies in seconds."""
 
     def __init__(self) -> None:
         self._seqs: dict[str, list[int]] = defaultdict(list)
         self.late: list[float] = []
 
     def note(self, topic: str, payload: bytes) -> None:
-        """Take in one message."""
+        """Record one message."""
         message: dict[str, Any] = json.loads(payload)
         if "seq" in message:
             self._seqs[topic].append(message["seq"])
             self.late.append(time.monotonic() - message.get("sent", 0.0))
 
-    def told(self) -> tuple[int, int]:
-        """How many came, and how many did not between the first and the last of each robot."""
+    def counts(self) -> tuple[int, int]:
+        """Return the messages received, and those missing between each robot's first and last."""
         wanted = sum(max(s) - min(s) + 1 for s in self._seqs.values())
         came = sum(len(set(s)) for s in self._seqs.values())
         return came, wanted - came
 
 
 class Robots(MqttStandIns):
-    """Stand-ins that say when they speak, and count what they hear."""
+    """Stand-ins that time-stamp what they send, and count what they receive."""
 
     def __init__(self, settings: MqttSettings) -> None:
         self.counted = Counted()
@@ -71,7 +71,7 @@ class Robots(MqttStandIns):
 
 
 class Driver(MqttFleet):
-    """The fleet, which counts what it hears."""
+    """A fleet that counts what it receives."""
 
     def __init__(self, settings: MqttSettings) -> None:
         self.counted = Counted()
@@ -83,7 +83,7 @@ class Driver(MqttFleet):
 
 
 def main(robots: int = 100, seconds: float = 60.0) -> None:
-    """Print what came and what did not."""
+    """Print how many messages came, how many were lost, and their latency."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -127,7 +127,7 @@ def _measured(settings: MqttSettings, seconds: float) -> None:
     done.set()
     goals, missed = ours.recv()
     process.join()
-    came, lost = fleet.counted.told()
+    came, lost = fleet.counted.counts()
     late = 1000 * np.array(fleet.counted.late)
     p50, p99 = np.percentile(late, [50, 99])
     ids = len(settings.robots)
@@ -138,10 +138,10 @@ def _measured(settings: MqttSettings, seconds: float) -> None:
 
 
 async def _drive(fleet: Driver, seconds: float) -> tuple[int, float, float]:
-    """How often goals were sent, in how many seconds, at what share of a core."""
+    """Drive the fleet; return how often goals were sent, in how many seconds, at what CPU share."""
     poses: tuple[Pose, ...] = ()
     while not poses:
-        with suppress(FleetError):  # the robots are still on their way to the broker
+        with suppress(FleetError):  # the robots are still connecting to the broker
             poses = await fleet.observe()
     points = points_of(poses)
     ends = points + np.array([SPEED * seconds, 0.0])
@@ -159,7 +159,7 @@ async def _drive(fleet: Driver, seconds: float) -> tuple[int, float, float]:
 def _stand_in(settings: MqttSettings, done: Event, results: Connection) -> None:
     robots = Robots(settings)
     robots.run(done.is_set)
-    results.send(robots.counted.told())
+    results.send(robots.counted.counts())
     robots.close()
 
 

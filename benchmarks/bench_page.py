@@ -1,9 +1,8 @@
-"""The page as a newcomer uses it: clicks, keys and seconds of ten things they would try first.
+"""`python -m formup.benchmarks.bench_page FOLDER`: ten things that a newcomer tries on the page.
 
-`python -m formup.benchmarks.bench_page FOLDER` drives a real browser (`chromium` on the PATH, and
-playwright) against a server of its own, writes a screenshot of each, and prints tables: the things,
-the size of what is loaded, how long a click takes to an outline at two megapixels, and frame times
-while one of 30 robots is dragged and 1,000 and 10,000 are drawn as they move.
+It drives a browser (`chromium` on the PATH) by playwright against a server of its own, writes a
+screenshot of each, and prints acts and seconds; also the size of the code, the time from a click to
+an outline, and frame times while one of 30 robots is dragged and 1,000 and 10,000 move.
 """
 
 import gzip
@@ -55,7 +54,12 @@ def _say(text: str) -> None:
 
 
 class Newcomer:
-    """Uses a page, and counts what their hands do."""
+    """A newcomer who uses the page, with a count of clicks, drags and sentences.
+
+    Attributes:
+        acts: number of clicks, drags and sentences since the last `tries` began.
+        rows: what was tried, with its acts and seconds.
+    """
 
     def __init__(self, page: "Page", url: str, folder: Path) -> None:
         self.page, self.url, self.folder = page, url, folder
@@ -67,7 +71,7 @@ class Newcomer:
         self.page.click(selector)
 
     def say(self, words: str) -> None:
-        """Write words, send them, and wait for what comes of them."""
+        """Type words, send them, and wait for the turn to end."""
         self.acts += 1
         done = self.page.locator("#log > li[data-status]")
         before = done.count()
@@ -77,7 +81,7 @@ class Newcomer:
         self.page.wait_for_selector("#talk:not([aria-busy])", timeout=LONG)
 
     def on_picture(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point of the picture is on the screen."""
+        """Return where a point of the picture is on the screen, px."""
         at: list[float] = self.page.evaluate(
             "([x, y]) => { const p = new DOMPoint(x, y).matrixTransform("
             "document.querySelector('#scene').getScreenCTM()); return [p.x, p.y]; }",
@@ -86,7 +90,7 @@ class Newcomer:
         return at[0], at[1]
 
     def drag(self, start: tuple[float, float], end: tuple[float, float], steps: int = 12) -> None:
-        """Press, move and let go, px of the screen."""
+        """Press the mouse, move it and release it; px of the screen."""
         self.acts += 1
         self.page.mouse.move(*start)
         self.page.mouse.down()
@@ -94,13 +98,13 @@ class Newcomer:
         self.page.mouse.up()
 
     def robot(self, number: int) -> tuple[float, float]:
-        """Where the mark of a robot is on the screen."""
+        """Return where the mark of a robot is on the screen, px."""
         box = self.page.locator(f'.robot[data-number="{number}"] .disc').bounding_box()
         assert box is not None
         return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
     def tries(self, what: str, work: Callable[[], None]) -> None:
-        """Do one thing, and note what it took."""
+        """Do one thing, record its acts and seconds, and save a screenshot."""
         self.acts, began = 0, time.perf_counter()
         work()
         self.rows.append((what, self.acts, time.perf_counter() - began))
@@ -174,7 +178,7 @@ def _tour(new: Newcomer) -> None:
 
 
 def _frames(page: "Page", during: Callable[[], Any]) -> tuple[float, float]:
-    """Median and worst-but-5-percent time between frames, ms."""
+    """Return the median and 95th percentile of the time between frames, ms."""
     page.evaluate(FRAMES)
     during()
     times = sorted(page.evaluate("window.frames_.slice(2)"))
@@ -219,7 +223,7 @@ WATCHED = """async (count) => {
     tell('poses');
   }, 50);
 }"""
-"""Poses as an event stream gives them, 20 times a second; what is measured is their drawing."""
+"""Feeds the page poses 20 times a second, as an event stream does, to measure their drawing."""
 
 
 def _watching(new: Newcomer) -> None:
@@ -260,7 +264,7 @@ def _sizes() -> None:
 
 
 def main() -> None:
-    """Run it."""
+    """Run the benchmark."""
     from playwright.sync_api import sync_playwright
 
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "formup-runs/page")

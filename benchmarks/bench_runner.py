@@ -1,7 +1,7 @@
-"""`python -m formup.benchmarks.bench_runner`: what the runner costs beside the trials themselves.
+"""`python -m formup.benchmarks.bench_runner`: what the runner costs on top of the trials.
 
-1,500 trials of a policy that does next to nothing, their rows on the disk one by one. With
---inspect PYTHON, an interpreter that has inspect_ai, Inspect runs as many in the same minute.
+It runs 1,500 trials of a policy that does next to nothing, and writes their rows to disk one by
+one. With --inspect PYTHON, an interpreter that has inspect_ai, Inspect then runs as many.
 """
 
 import argparse
@@ -19,14 +19,14 @@ from ..evals.experiments.trials import Arm, Trial, TrialRow
 TASKS, TRIES = 150, 10
 COIN = Arm(method="coin", model="offline")
 INSPECT = Path(__file__).parent / "loop" / "peers" / "trials_inspect.py"
-"""In a checkout alone."""
+"""Exists only in a checkout."""
 
 _inside = [0.0]
-"""CPU seconds spent in trials of this process."""
+"""CPU seconds that this process has spent inside trials."""
 
 
 def trivial(trial: Trial) -> TrialRow:
-    """A coin with the trial's seed."""
+    """Toss a biased coin with the trial's seed."""
     began = time.process_time()
     passed = random.Random(trial.seed).random() < 0.7
     row = TrialRow.of(trial, "pass" if passed else "fail", gcr=float(passed))
@@ -35,7 +35,7 @@ def trivial(trial: Trial) -> TrialRow:
 
 
 def trials() -> list[Trial]:
-    """All tries of all tasks, in one arm."""
+    """Return all tries of all tasks, in one arm."""
     return [
         Trial(suite="0" * 64, task=f"task-{n:03d}", trial=number, arm=COIN)
         for n in range(TASKS)

@@ -1,7 +1,7 @@
 """`python -m formup.benchmarks.bench_sampling`: CPU time of placing and checking many robots.
 
-Beside each time stand the bare library calls that nothing could do without, on the same data, and
-how fast the time grows with the number of robots and of vertices.
+It is shown beside the bare library calls that are needed at least, on the same data, and as growth
+with the numbers of robots and of vertices.
 """
 
 import itertools
@@ -27,13 +27,13 @@ REPEATS = 3
 SIZE = 12_000.0
 MANY, VERTICES = 10_000, 1000
 FINE = 1_000_000
-"""Cells that the energy is summed over."""
+"""Number of cells that the energy is summed over."""
 HEXAGON = 5 / (18 * 3**0.5)
-"""Energy of a hexagonal lattice, by area squared over the number of robots (Fejes Toth)."""
+"""Energy of a hexagonal lattice, divided by area squared over the number of robots (Fejes Toth)."""
 
 
 def rows() -> Iterator[str]:
-    """The tables."""
+    """Yield the tables."""
     outline = bumpy(VERTICES)
     yield f"CPU milliseconds, best of {REPEATS}; an outline of {VERTICES} vertices"
     yield from _placing(outline)
@@ -43,14 +43,14 @@ def rows() -> Iterator[str]:
 
 
 def bumpy(vertices: int) -> Outline:
-    """A smooth closed outline with bays."""
+    """Return a smooth closed outline with bays."""
     t = np.arange(vertices) / vertices * 2 * np.pi
     radius = SIZE / 3 * (1 + 0.25 * np.sin(3 * t) + 0.1 * np.sin(7 * t + 1))
     return make_outline(np.stack([np.cos(t), np.sin(t)], axis=1) * radius[:, None] + SIZE / 2)
 
 
 def energy_ratio(outline: Outline, points: FloatArray) -> float:
-    """Energy of the Voronoi cells of robots in a region, by that of a hexagonal lattice."""
+    """Return the energy of robots' Voronoi cells in a region, relative to a hexagonal lattice's."""
     cells = grid(outline.polygon, float(np.sqrt(outline.area / FINE)))
     mean = float((nearest(points, cells, 1)[0] ** 2).mean())
     return mean * outline.area / (HEXAGON * outline.area**2 / len(points))
@@ -78,7 +78,7 @@ def _placing(outline: Outline) -> Iterator[str]:
 
 
 def _bare_ring(outline: Outline, n: int) -> Work:
-    """The region grown, and places on its edge, without a bay bridged or a phase chosen."""
+    """Buffer the region and place robots on its edge, without bridging bays or choosing a phase."""
 
     def work() -> object:
         line = outline.filled.buffer(100).exterior
@@ -93,7 +93,7 @@ def _bare_places(loop: Curve, n: int) -> Work:
 
 
 def _bare_lloyd(outline: Outline, n: int) -> Work:
-    """As many plain steps of Lloyd's iteration as one start gets, from random places."""
+    """Run as many plain steps of Lloyd's iteration as one start gets, from random places."""
     cells = cells_of(outline.polygon, n)
     first = np.random.default_rng(0).choice(cells, n, replace=False)
 
@@ -114,7 +114,7 @@ def _eight(outline: Outline) -> Work:
 
 
 def _inside(outline: Outline, n: int) -> Work:
-    """Places robots inside; each time a little deeper, so that nothing is kept from the last."""
+    """Place robots inside, each time slightly deeper, so that no call reuses a cached result."""
     margins = itertools.count(10, 1e-6)
     return lambda: inside(outline, n, next(margins), SIZE, 0.0)
 
@@ -128,7 +128,7 @@ def _checking(outline: Outline) -> Iterator[str]:
 
 
 def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]:
-    """The check of places that hold, and these."""
+    """Return the check of places that pass it, and the places, (n, 2) px."""
     site = Site({"t1": outline}, SIZE, SIZE)
     group = Group.model_validate({"relation": relation, "targets": ["t1"], "robots": n})
     contract = with_defaults(Contract(groups=(group,)), site.outlines, site.room)
@@ -138,13 +138,13 @@ def _checked(relation: str, outline: Outline, n: int) -> tuple[Work, FloatArray]
 
 
 def _bare_around(outline: Outline, points: FloatArray) -> Work:
-    """Distances to the outline and to the ring, and to the nearest other robot."""
+    """Compute distances to the outline, to the ring and to the nearest other robot."""
     lines = outline.filled, shapely.LineString(ring(outline, 100, 200).lines[0])
     return lambda: (_near(lines, points), cKDTree(points).query(points, k=2))
 
 
 def _bare_in(outline: Outline, points: FloatArray) -> Work:
-    """Distances to the outline and to the nearest other robot, and how far all ground is."""
+    """Compute distances to the outline and the nearest other robot, and from cells to robots."""
 
     def work() -> object:
         cells = cells_of(outline.polygon, len(points))
@@ -160,7 +160,7 @@ def _near(lines: Sequence[BaseGeometry], points: FloatArray) -> object:
 
 
 def _growth() -> Iterator[str]:
-    """Time and memory against the number of robots and of vertices."""
+    """Yield how time and memory grow with robots, and time with vertices."""
     outline, counts, corners = bumpy(VERTICES), (300, 1000, 3000, MANY), (300, 1000, 3000)
     loop = ring(outline, 100, 200)
     by_robots: dict[str, Callable[[int], Work]] = {

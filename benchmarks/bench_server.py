@@ -1,8 +1,8 @@
-"""What a server adds to the turns it serves: the same conversations over HTTP and in process.
+"""`python -m formup.benchmarks.bench_server`: what a server adds to the turns it serves.
 
-`python -m formup.benchmarks.bench_server`: 200 conversations at once, each planned and edited, by
-the offline planner on a photograph, in a SQLite store; CPU of the serving process alone. Then how
-many follow one deployment; with --memory instead, what the process holds after many turns.
+It holds 200 conversations at once over HTTP and in process: the offline planner, a photograph, a
+SQLite store, CPU of the serving process alone. Then many clients follow one deployment. With
+--memory instead, it prints the memory of the process over many turns.
 """
 
 import asyncio
@@ -28,16 +28,16 @@ from .growth import show
 PHOTO = Path(__file__).parents[1] / "evals/photos/images/us_coins.jpg"
 WORDS = ("Cage the largest coin", "a bit further out", "turn it 10 degrees", "how far is robot 4?")
 COIN = {"id": "t1", "outline": [[246, 32], [311, 97], [246, 156], [181, 95]]}
-"""What is pointed at where turns are to be quick: nothing is looked for."""
+"""Outline of the coin, pointed at so that turns are quick, as nothing has to be found."""
 CHEAP = ("how far is robot 4?", "undo", "how many robots are there?", "redo")
 SESSIONS, TURNS, SUBSCRIBERS = 200, 10_000, 1_000
 LINE = 2**24
-"""Most bytes of an event."""
+"""Most bytes of a line of an event stream."""
 Say = Callable[[str, str], Awaitable[None]]
 
 
 async def _talks(begin: Callable[[], Awaitable[str]], say: Say) -> tuple[list[float], float]:
-    """Seconds of each first turn, and of all, for many conversations at once."""
+    """Hold many conversations at once; return seconds of each first turn, and of all together."""
 
     async def talk() -> float:
         session = await begin()
@@ -70,7 +70,7 @@ async def _in_process(store: str) -> tuple[list[float], float, float]:
 
 
 class Client:
-    """A client of a server, one connection a request.
+    """A client of a server, with one connection per request.
 
     Args:
         address: HOST:PORT.
@@ -83,7 +83,7 @@ class Client:
     async def opened(
         self, method: str, path: str, body: bytes = b""
     ) -> AsyncGenerator[asyncio.StreamReader]:
-        """The response to a request, as it comes."""
+        """Yield the response to a request as a stream."""
         reader, writer = await asyncio.open_connection(self._host, int(self._port), limit=LINE)
         kind = "application/json" if body[:1] == b"{" else "image/jpeg"
         head = f"{method} {path} HTTP/1.1\r\nHost: {self._host}\r\nConnection: close\r\n"
@@ -94,19 +94,19 @@ class Client:
         writer.close()
 
     async def asked(self, method: str, path: str, body: bytes = b"") -> str:
-        """The whole response."""
+        """Return the whole response to a request, head included."""
         async with self.opened(method, path, body) as reader:
             text = (await reader.read()).decode()
         assert text.startswith("HTTP/1.1 2"), text[:500]
         return text
 
     async def begin(self, data: bytes, path: str = "/api/sessions?robots=8") -> str:
-        """A session about a picture, or at another path; its own path."""
+        """Begin a session with a picture, or by posting to another path; return its path."""
         made = await self.asked("POST", path, data)
         return f"/api/sessions/{json.loads(made[made.index('{') :])['id']}"
 
     async def say(self, session: str, words: str, **more: object) -> None:
-        """A turn, to its end."""
+        """Say something and wait for the turn to end."""
         said = json.dumps({"words": words, **more}).encode()
         told = await self.asked("POST", f"{session}/messages?wait=60", said)
         while told.startswith("HTTP/1.1 202"):
@@ -114,7 +114,7 @@ class Client:
             told = await self.asked("GET", f"{session}/turns/{number}?wait=60")
 
     async def figure(self, name: str) -> float:
-        """One of the server's figures."""
+        """Return one of the server's metrics."""
         found = re.search(rf"^{name} (\S+)$", await self.asked("GET", "/metrics"), re.M)
         assert found is not None
         return float(found[1])
@@ -122,7 +122,7 @@ class Client:
 
 @asynccontextmanager
 async def _server(store: str) -> AsyncGenerator[Client]:
-    """A server in a process of its own."""
+    """Yield a client of a server in a process of its own."""
     environment = os.environ | {
         "FORMUP_REQUESTS_PER_MINUTE": "1000000",
         "FORMUP_REQUESTS": "5000",
@@ -159,7 +159,7 @@ def _row(name: str, firsts: Sequence[float], wall: float, spent: float) -> str:
 
 
 async def _memory(store: str) -> None:
-    """Short conversations one after another, each a fork: what is planned once costs no time."""
+    """Print memory over short conversations; each is a fork, so that planning costs no time."""
     async with _server(store) as client:
         planned = await client.begin(PHOTO.read_bytes())
         await client.say(planned, "Surround it", pointed=[COIN])
@@ -174,7 +174,7 @@ async def _memory(store: str) -> None:
 
 
 async def _followers(store: str) -> None:
-    """Many follow one deployment; each has to hear its end."""
+    """Print how soon all of many followers of one deployment receive its end."""
     async with _server(store) as client:
         session = await client.begin(PHOTO.read_bytes())
         await client.say(session, WORDS[0])
@@ -198,7 +198,7 @@ async def _followers(store: str) -> None:
 
 
 def main() -> None:
-    """Print what a server adds; with --memory, how much it holds after many turns."""
+    """Print what a server adds; with --memory, how much memory it uses after many turns."""
     with TemporaryDirectory() as folder:
         stores = [f"sqlite:///{folder}/{name}.db" for name in "abc"]
         if "--memory" in sys.argv:

@@ -1,6 +1,6 @@
-"""Long sessions: how long one takes to open and to write, and what its next request weighs.
+"""Long sessions: the time to open, fork and append to one, and the tokens of its next request.
 
-Turns are edits: a plan that moved a little, the call that asked for it, its result, what was said.
+Turns are edits: a plan that moved a little, the call for it, its result, and the words of both.
 """
 
 import asyncio
@@ -34,7 +34,7 @@ from .growth import best, show
 SIZES = (10, 300, 3_000)
 ROBOTS = 30
 BOX = TargetPrompt(id="t1", box=(700, 400, 1_000, 700))
-"""In a picture of two megapixels."""
+"""The box in the picture of two megapixels."""
 
 
 class Listed:
@@ -62,22 +62,22 @@ class Listed:
 
 
 def picture() -> Picture:
-    """A red box on grey, with two megapixels."""
+    """Return a picture of two megapixels, a red box on grey."""
     pixels = np.full((1_080, 1_920, 3), 90, np.uint8)
     pixels[410:690, 710:990] = (200, 40, 40)
     return picture_from_array(pixels)
 
 
-def begun(folder: Path) -> Run:
-    """A session of one turn, as the offline planner makes it."""
+def first_run(folder: Path) -> Run:
+    """Return the run of a session of one turn, planned offline."""
     settings = Settings(robots=ROBOTS, may_deploy=False)
     stored = FolderStore(folder).create()
     return Agent().run(picture(), "Surround it", pointed=[BOX], settings=settings, trace=stored)
 
 
 def long_session(turns: int, folder: Path) -> tuple[tuple[Event, ...], tuple[bytes, ...]]:
-    """The events and files of a session of so many turns."""
-    first = begun(folder)
+    """Return the events and files of a session of a number of turns."""
+    first = first_run(folder)
     assert first.stored is not None and first.report.plan_id is not None
     log = Listed(first.stored.events())
     files = files_named(log.written, first.stored.artefacts)
@@ -85,25 +85,25 @@ def long_session(turns: int, folder: Path) -> tuple[tuple[Event, ...], tuple[byt
     start = first.outcome.messages[0]
     assert isinstance(start, User)
     settings = to_json_values(first.context.settings)
-    asyncio.run(written(recorder, first.world, start.text, settings, turns))
+    asyncio.run(record_turns(recorder, first.world, start.text, settings, turns))
     return tuple(log.written), files
 
 
-async def written(
+async def record_turns(
     recorder: LogRecorder, world: World, start: str, settings: Any, turns: int
 ) -> None:
-    """Write the turns after the first."""
+    """Record the turns after the first, up to number `turns`."""
     for number in range(2, turns + 1):
         words = f"A bit further out than in turn {number - 1}"
         await recorder.event("turn", {"words": words, "settings": settings})
         before, world = world, edited(world, number)
-        for message in said(number, words, start, world):
+        for message in turn_messages(number, words, start, world):
             await recorder.message(message, before if isinstance(message, User) else world)
-        await recorder.end(world, ended(world))
+        await recorder.end(world, end_data(world))
 
 
 def edited(world: World, number: int) -> World:
-    """The world with one more plan, all of whose robots stand a little further left."""
+    """Return the world with one more plan, whose robots all stand a little further left."""
     node = world.plan()
     places = tuple((round(x - 0.001 * number, 3), y) for x, y in node.plan.formation.positions)
     formation = node.plan.formation.model_copy(update={"positions": places})
@@ -111,8 +111,8 @@ def edited(world: World, number: int) -> World:
     return world.with_plan(PlanNode(plan=plan, parent=world.current, edit='[{"kind": "out"}]'))
 
 
-def said(number: int, words: str, start: str, world: World) -> Iterator[Message]:
-    """The messages of a turn that makes an edit."""
+def turn_messages(number: int, words: str, start: str, world: World) -> Iterator[Message]:
+    """Yield the messages of a turn that makes an edit."""
     standing = {
         "plan": world.current,
         "contract": world.plan().plan.formation.contract.model_dump(
@@ -138,8 +138,8 @@ def said(number: int, words: str, start: str, world: World) -> Iterator[Message]
     yield Reply(text=f"All {ROBOTS} robots stand 12.5 px further out (plan {world.current}).")
 
 
-def ended(world: World) -> dict[str, Any]:
-    """The event that ends a turn."""
+def end_data(world: World) -> dict[str, Any]:
+    """Return the data of the event that ends a turn."""
     usage = {"requests": 2, "tool_calls": 1, "input_tokens": 8_000, "output_tokens": 90}
     return {
         "outcome": "answered",
@@ -150,7 +150,7 @@ def ended(world: World) -> dict[str, Any]:
 
 
 def next_request(history: History, number: int) -> int:
-    """Tokens of the first request of a turn: prompt, tools, and what is sent of the history."""
+    """Return the tokens of a turn's first request: prompt, tools and the compacted history."""
     turns = [i for i, message in enumerate(history) if isinstance(message, User)]
     asked = history[: turns[number - 1] + 1]
     tools = [[t.name, t.description, t.schema] for t in TOOLS]
@@ -159,14 +159,17 @@ def next_request(history: History, number: int) -> int:
 
 
 def tokens(history: History) -> int:
-    """Some four characters each, as in `formup prompts`; pictures aside."""
+    """Return roughly the tokens of messages, at four characters each, pictures aside.
+
+    `formup prompts` counts them the same way.
+    """
     return (
         sum(len(m.text) + len(json.dumps(message_facts(m).get("calls", ()))) for m in history) // 4
     )
 
 
 def rows() -> Iterator[str]:
-    """Sessions by their length: opening, forking, appending; then what requests weigh."""
+    """Yield times to open, fork and append to sessions by length, then the tokens of requests."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         events, files = long_session(max(SIZES), home / "begun")
@@ -183,7 +186,7 @@ def rows() -> Iterator[str]:
 def size_row(
     stores: Sequence[Store], events: Sequence[Event], files: Sequence[bytes], turns: int
 ) -> str:
-    """How long a session of so many turns takes to open, and to copy."""
+    """Return a row: how long a session of a number of turns takes to open and to fork, ms."""
     stored = [store.create("bench", events, files) for store in stores]
     size = sum(len(to_json(dict(event.data))) for event in events) / 1e6
     opened = " ".join(
@@ -195,7 +198,7 @@ def size_row(
 
 
 def wall(work: Callable[[], object], repeats: int = 5) -> float:
-    """Least milliseconds by the clock over the repeats."""
+    """Return the least wall time over the repeats, ms."""
     times: list[float] = []
     for _ in range(repeats):
         began = time.perf_counter()
@@ -205,7 +208,7 @@ def wall(work: Callable[[], object], repeats: int = 5) -> float:
 
 
 def appending(stores: Sequence[Store]) -> Iterator[str]:
-    """Milliseconds that one event takes."""
+    """Yield the milliseconds that appending one event takes in each store."""
     for store in stores:
         log = store.create("appending").write(0)
         spent = wall(lambda log=log: log.append("message", {"text": "x" * 500}), 200)
@@ -214,7 +217,7 @@ def appending(stores: Sequence[Store]) -> Iterator[str]:
 
 
 def weights(history: History) -> Iterator[str]:
-    """Tokens of requests late in a conversation, beside those of its tenth."""
+    """Yield the tokens of requests throughout a conversation, and their ratio to the tenth."""
     tenth = next_request(history, 10)
     yield f"{'request':>8} {'tokens':>8} {'/ 10th':>7}"
     for number in (1, 10, 100, 301, 303, 3_000):

@@ -1,8 +1,8 @@
-"""`python -m formup.benchmarks.bench_simulator`: the stepping simulator, in steps and in residuals.
+"""`python -m formup.benchmarks.bench_simulator`: speed and residuals of the stepping simulator.
 
-Steps per second of CPU time beside pyrvo's, which steps discs that avoid each other towards a
-velocity each, with its positions read and its velocities set, as ours are; in turns, where it is
-installed. Then a team on two wheels with 5 % noise, over seeds.
+It prints steps per second of CPU time beside pyrvo's, if installed, which steps discs that avoid
+each other; its positions are read and velocities set at each step, as ours are, and the two take
+turns. Then it drives teams on two wheels with 5 % noise, over seeds.
 """
 
 import asyncio
@@ -38,7 +38,7 @@ SITE = Site({"t1": make_outline([(400, 300), (800, 300), (800, 600), (400, 600)]
 
 
 def _ways(n: int) -> tuple[FloatArray, FloatArray]:
-    """Starts 20 px apart and ways of six legs, (n, 7, 2) px."""
+    """Return starts 20 px apart, (n, 2) px, and paths of six legs, (n, 7, 2) px."""
     random, side = np.random.default_rng(n), math.ceil(math.sqrt(n))
     starts = 20.0 * np.stack(np.divmod(np.arange(n), side), axis=1)
     legs = random.uniform(-300, 300, (n, 6, 2))
@@ -57,7 +57,7 @@ def _ours(n: int, drive: str) -> Callable[[], object]:
 
 
 def _fleet(n: int) -> Callable[[], object]:
-    """As `drive` is read: with poses made at each step."""
+    """Return a step of `SimulatedFleet.drive`, which makes poses each time."""
     starts, ways = _ways(n)
     poses = [Pose(str(i), float(x), float(y)) for i, (x, y) in enumerate(starts)]
     motion = Motion(dict(zip((pose.id for pose in poses), ways, strict=True)))
@@ -111,7 +111,7 @@ def _show_steps() -> None:
 
 
 def _team(robots: int) -> None:
-    """What a team on two wheels comes to."""
+    """Print how a team on two wheels arrives over the seeds."""
     group = Group(relation="around", targets=("t1",), robots=robots)
     contract = Contract(groups=(group,), robot_radius=RADIUS)
     plan = make_plan(contract, SITE, "bench")

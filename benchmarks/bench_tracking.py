@@ -1,7 +1,7 @@
-"""`python -m formup.benchmarks.bench_tracking`: how well a thing is followed by sight, how fast.
+"""`python -m formup.benchmarks.bench_tracking`: accuracy and speed of visual tracking.
 
-On drawn video whose truth is known, 1000 x 750 px; overlap is intersection over union of the
-outline as followed and as it was, in the frames in which the tracker says that it sees the thing.
+It runs on drawn video with known truth, 1000 x 750 px; overlap is the intersection over union of
+the tracked and the true outline, in the frames in which the tracker says that it sees the thing.
 """
 
 from collections.abc import Iterator
@@ -32,7 +32,7 @@ CASES = {
 
 
 def rows() -> Iterator[str]:
-    """The table."""
+    """Yield the table."""
     yield f"{'case':32}{'thing':10}{'mean':>7}{'worst':>7}{'seen':>7}{'CPU ms':>8}{'p95':>7}"
     for name, case in CASES.items():
         for look in ("textured", "coloured", "grey"):

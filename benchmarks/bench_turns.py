@@ -1,7 +1,7 @@
-"""What a turn of a conversation takes offline: an edit of 30 robots in a picture of 2 megapixels.
+"""CPU time of an offline turn that edits 30 robots in a picture of 2 megapixels.
 
-CPU time of the whole process, the first turns and the later ones side by side; drawing the picture
-and encoding it is printed beside.
+It is the time of the whole process, for the first turns and later ones; the time to draw and
+encode the picture is printed too.
 """
 
 import time
@@ -23,7 +23,7 @@ SIZE, ROBOTS = (1100, 1840), 30
 BOX = (780, 420, 1060, 680)
 WORDS = ("a bit further out", "turn it 10 degrees", "a bit closer", "turn it back 10 degrees")
 ROUNDS = (1, 10, 50)
-"""Turns whose cost is shown: the median of four from each of these rounds on."""
+"""Rounds of four turns whose median cost is shown."""
 
 
 def _scene() -> Picture:
@@ -35,7 +35,7 @@ def _scene() -> Picture:
 
 
 def main() -> None:
-    """Print what turns take."""
+    """Print the CPU time of turns."""
     settings = Settings(robots=ROBOTS)
     session = Agent().start(_scene(), pointed=[TargetPrompt(box=BOX)], settings=settings)
     session.say("Surround it")

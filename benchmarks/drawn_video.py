@@ -1,6 +1,6 @@
-"""What a fixed camera above a floor sees, drawn: a thing that moves, robots, and disturbances.
+"""Drawn video of a fixed camera above a floor: a thing that moves, robots, and disturbances.
 
-The truth is known of every frame; the benchmark and the tests of tracking look at the same.
+The truth of every frame is known; the benchmark and the tests of tracking share these videos.
 """
 
 import math
@@ -21,7 +21,7 @@ from ..tools.perception.tracking.tracker import ObjectTracker, Tracked
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
 FINER = 4
-"""Everything is drawn so many times larger, and averaged."""
+"""Supersampling factor: regions are drawn this many times larger, and averaged."""
 SHAPES = {
     "box": [(-60, -40), (60, -40), (60, 40), (-60, 40)],
     "ell": [(-70, -60), (70, -60), (70, 0), (0, 0), (0, 60), (-70, 60)],
@@ -31,7 +31,7 @@ SHAPES = {
 
 @dataclass(frozen=True)
 class Seen:
-    """What a tracker said of a frame, its overlap with the truth, and the CPU ms that it took."""
+    """A tracker's answer for a frame, its overlap with the truth (IoU), and its CPU time in ms."""
 
     frame: int
     tracked: Tracked
@@ -41,22 +41,22 @@ class Seen:
 
 @dataclass(frozen=True)
 class Video:
-    """A thing, how it moves, and what disturbs.
+    """A video: a thing, how it moves, and disturbances.
 
     Attributes:
         look: of the thing: textured, coloured (plain) or grey (plain).
         floor: plain or textured.
-        speed: px a frame; the way bends.
-        turn: degrees a frame.
-        robots: follow (stay about the thing), stay (where they were), or none.
-        noise: grey levels, standard deviation.
-        light: by how much the picture grows darker until the last frame, as a share.
-        shadow: a dark band passes over.
-        blur: px that are smeared along x.
-        covered: share of the thing that something covers, in the middle third of the frames.
-        leaves: the thing goes straight out of the picture.
-        size: of the frames, px.
-        seed: of the noise, the patterns and the way.
+        speed: px per frame; the path bends.
+        turn: degrees per frame.
+        robots: follow (move along with the thing), stay (where they were), or none.
+        noise: standard deviation, in grey levels.
+        light: fraction by which the picture has darkened in the end.
+        shadow: whether a dark band passes over.
+        blur: width of a blur along x, px.
+        covered: fraction of the thing that something covers, in the middle third of the frames.
+        leaves: whether the thing moves straight out of the picture.
+        size: width and height of the frames, px.
+        seed: of the noise, the patterns and the path.
     """
 
     look: str = "textured"
@@ -77,12 +77,12 @@ class Video:
 
     @cached_property
     def outline(self) -> Outline:
-        """Of the thing in the first frame."""
+        """The outline of the thing in the first frame."""
         at = np.multiply((0.3, 0.35), self.size)
         return make_outline(np.array(SHAPES[self.shape]) + at)
 
     def motion(self, frame: int) -> tuple[float, float, float]:
-        """dx, dy px and the turn, radians, by a frame."""
+        """Return how the thing has moved by a frame: dx and dy, px, and its turn, radians."""
         turn, way = math.radians(self.turn) * frame, self.speed * frame
         if self.leaves:
             return -way, 0.0, turn
@@ -90,17 +90,17 @@ class Video:
         return way * math.cos(along), way * math.sin(along), turn
 
     def carried(self, region: Polygon, motion: tuple[float, float, float]) -> Polygon:
-        """A region that moves with the thing."""
+        """Return a region moved along with the thing."""
         dx, dy, turn = motion
         turned = affinity.rotate(region, turn, self.outline.centre, use_radians=True)
         return affinity.translate(turned, dx, dy)
 
     def truth(self, frame: int) -> Polygon:
-        """The thing in a frame."""
+        """Return the region of the thing in a frame."""
         return self.carried(self.outline.polygon, self.motion(frame))
 
     def follow(self) -> Iterator[Seen]:
-        """How a tracker does from the second frame on."""
+        """Run a tracker, and yield its result for each frame from the second on."""
         pictures = self.pictures()
         tracker = ObjectTracker(next(pictures), self.outline)
         for frame, picture in enumerate(pictures, start=1):
@@ -112,7 +112,7 @@ class Video:
             yield Seen(frame, tracked, overlap, 1000 * took)
 
     def pictures(self) -> Iterator[Bytes]:
-        """The frames."""
+        """Yield the frames."""
         random = np.random.default_rng(self.seed)
         floor, cloth = self._floor(random), self._cloth(random)
         for frame in range(self.frames):
@@ -127,7 +127,7 @@ class Video:
         return plain * shading
 
     def _cloth(self, random: np.random.Generator) -> Floats:
-        """The thing's colours about its centre, (400, 400, 3)."""
+        """Return the thing's colours around its centre, (400, 400, 3)."""
         colour = {"textured": (90, 120, 140), "coloured": (60, 70, 190), "grey": (70, 72, 75)}
         cloth = np.full((400, 400, 3), colour[self.look], np.float32)
         return cloth + spots(random, (400, 400), 3.0, 40.0) if self.look == "textured" else cloth
@@ -178,13 +178,19 @@ class Video:
 
 
 def spots(random: np.random.Generator, size: tuple[int, int], wide: float, strong: float) -> Floats:
-    """Smooth noise (h, w, 3)."""
+    """Return smooth noise, (h, w, 3).
+
+    Args:
+        size: height and width, px.
+        wide: standard deviation of the blur, px.
+        strong: standard deviation of the noise.
+    """
     noise = cv2.GaussianBlur(random.standard_normal((*size, 3), np.float32), (0, 0), wide)
     return strong * noise / noise.std()
 
 
 def paint(canvas: Floats, region: Polygon, colour: Floats | tuple[int, int, int]) -> None:
-    """Lay a colour, or a picture of the canvas's size, over a region, with soft edges."""
+    """Paint a region with a colour, or a picture of the canvas's size, with soft edges."""
     h, w = canvas.shape[:2]
     x0, y0, x1, y1 = (int(edge) for edge in region.bounds)
     part = np.s_[max(y0 - 2, 0) : min(y1 + 3, h), max(x0 - 2, 0) : min(x1 + 3, w)]

@@ -1,8 +1,8 @@
-"""`python -m formup.benchmarks.false_blocks`: how often the gate blocks, no worse and worse.
+"""`python -m formup.benchmarks.false_blocks`: how often the gate blocks versions, equal or worse.
 
-Seeded comparisons of simulated versions go through the gate itself. Rates of tasks come from a beta
-distribution with ICC .3; tasks whose rate is .99 or more are the ones that must pass. Of the
-output .02 is invalid.
+Seeded comparisons of simulated versions go through the gate itself. Success rates of tasks come
+from a beta distribution with ICC .3; tasks with a rate of .99 or more must pass. Of the output,
+.02 is invalid.
 """
 
 import sys
@@ -20,16 +20,16 @@ from ..tools.geometry.outline import FloatArray
 
 COMPARISONS, SEED = 2000, 0
 SIZES = ((15, 2), (15, 10), (30, 10), (60, 10), (150, 10))
-"""Tasks and trials of each."""
+"""Numbers of tasks, and of trials of each."""
 MEAN, TASK_SD = 0.7, 0.05
-"""Success rate of the first version, and the spread of a version's effect between tasks."""
+"""Mean success rate of the old version; standard deviation of the effect between tasks."""
 INVALID = 0.02
 TOKENS, TOKENS_SD = 3000.0, 0.1
 """Mean tokens of a trial, and the relative spread of a task's mean."""
 ALWAYS = 0.99
 REGRESSION = 0.10
 PLANTED = ((12, 10), (12, 20), (12, 30), (30, 10), (60, 10))
-"""Tasks and trials of each at which a lapse planted on purpose is looked for."""
+"""Numbers of tasks, and of trials of each, for a version with planted lapses."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Blocked:
 
     @property
     def interval(self) -> Interval:
-        """Of the rate of blocks, at 95 %."""
+        """The interval of the rate of blocks, at 95 %."""
         return wilson(self.blocked, self.comparisons)
 
 
@@ -60,8 +60,8 @@ def simulate(
     """Put simulated comparisons through the gate.
 
     Args:
-        regression: what the new version loses on every task, as far as its rate goes.
-        task_sd: spread of the effect it has on each task but those that must pass.
+        regression: what the new version's rate loses on every task, down to 0.
+        task_sd: standard deviation of its effect on each task except those that must pass.
     """
     random = np.random.default_rng([SEED, tasks, trials, round(1000 * regression)])
     paired = (_versions(random, tasks, trials, regression, task_sd) for _ in range(comparisons))
@@ -75,7 +75,7 @@ def _judged(tasks: int, trials: int, regression: float, paired: Iterable[Paired]
 
 
 def rates(random: np.random.Generator, shape: tuple[int, ...], mean: float = MEAN) -> FloatArray:
-    """Success rates of tasks, from the beta distribution of that mean and the ICC."""
+    """Return success rates of tasks, from the beta distribution with that mean and the ICC."""
     weight = 1 / ICC - 1
     return random.beta(mean * weight, (1 - mean) * weight, shape)
 
@@ -83,7 +83,7 @@ def rates(random: np.random.Generator, shape: tuple[int, ...], mean: float = MEA
 def _versions(
     random: np.random.Generator, tasks: int, trials: int, regression: float, task_sd: float
 ) -> Paired:
-    """Two versions as they turn out."""
+    """Simulate the trials of two versions."""
     before = rates(random, (tasks,))
     always = before >= ALWAYS
     effect = np.where(always, 0.0, random.normal(0, 1, tasks) * task_sd)
@@ -108,12 +108,12 @@ def _paired(
 
 
 def planted(tasks: int, trials: int, share: float, *, comparisons: int = COMPARISONS) -> Blocked:
-    """Put a version through the gate that fails in a share of trials which the old one all passes.
+    """Put a version through the gate that lapses in some trials, where the old one always passes.
 
-    The lapse befalls any trial alike, as do those of evals/experiments/simulated_model.py.
+    Any trial may lapse alike, as in evals/experiments/simulated_model.py.
 
     Args:
-        share: of trials that lapse.
+        share: fraction of trials that lapse.
     """
     random = np.random.default_rng([SEED, tasks, trials, round(1000 * share)])
     nothing, tokens = np.zeros((2, tasks)), np.full((2, tasks), TOKENS)

@@ -1,6 +1,6 @@
-"""How long a piece of work takes and how much memory, and how both grow with its size.
+"""Measures the time and memory of a piece of work, and fits how they grow with its size.
 
-All benches measure and fit here, so that their figures mean the same.
+All benchmarks measure and fit here, so that their figures mean the same.
 """
 
 import time
@@ -13,23 +13,23 @@ Work = Callable[[], object]
 
 
 def show(rows: Iterable[str]) -> None:
-    """Print a table as it is measured."""
+    """Print rows as they are measured."""
     for row in rows:
         print(row, flush=True)  # noqa: T201
 
 
 def heading(what: str, last: str = "") -> str:
-    """The head of a table of rows that `beside` makes."""
+    """Return the heading of a table of rows made by `beside`."""
     return f"{what:32} {'formup':>10} {'bare':>10} {'ratio':>7}  {last}"
 
 
 def beside(name: str, ours: float, bare: float, last: str = "") -> str:
-    """One row: milliseconds beside those of the bare library calls."""
+    """Return a row: milliseconds beside those of the bare library calls, and the ratio."""
     return f"{name:32} {ours:10.2f} {bare:10.2f} {ours / bare:7.1f}  {last}"
 
 
 def best(work: Work, repeats: int) -> float:
-    """Least CPU milliseconds over the repeats, after one to warm up."""
+    """Return the least CPU milliseconds over the repeats, after a warm-up."""
     work()
     times: list[float] = []
     for _ in range(repeats):
@@ -40,7 +40,7 @@ def best(work: Work, repeats: int) -> float:
 
 
 def peak(work: Work) -> float:
-    """Greatest memory of a second run, MiB; what GEOS and k-d trees hold is not counted."""
+    """Return the peak memory of a second run, MiB, without that of GEOS and k-d trees."""
     work()
     tracemalloc.start()
     try:
@@ -53,7 +53,7 @@ def peak(work: Work) -> float:
 def growth(
     name: str, of: str, sizes: Sequence[float], values: Sequence[float], unit: str = "ms"
 ) -> str:
-    """One line that says what was measured and the power of the size that it grows with."""
+    """Return a line with what was measured, and the power of the size that it grows with."""
     measured = ", ".join(f"{value:.3g}" for value in values)
     span = f"{sizes[0]:,.0f} to {sizes[-1]:,.0f}"
     power = float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
@@ -61,5 +61,5 @@ def growth(
 
 
 def times(work: Callable[[int], Work], sizes: Sequence[int], repeats: int) -> list[float]:
-    """CPU milliseconds of the work that each size makes."""
+    """Return the CPU milliseconds of the work for each size."""
     return [best(work(size), repeats) for size in sizes]

@@ -1,4 +1,4 @@
-"""Robots that follow a motion in its order of passage, late by chance, some stopping for good."""
+"""Robots that follow a motion in its order of passage, late at random, some stopping for good."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,19 @@ from ..tools.motion.motion import Motion, arc_lengths
 from .motion_scenes import RADIUS
 
 STEP = 4 * RADIUS
-"""How far robots get in a step if nothing delays them, px."""
+"""Longest way of a robot in a step, px."""
 
 
 @dataclass(frozen=True)
 class Late:
-    """How a drive ended, in robots: all that stopped for good, and the others.
+    """How a drive ended, as numbers of robots.
 
     Attributes:
-        named: did not arrive, and wait for one that waits for one ... that stopped.
-        unnamed: did not arrive, and nobody says why.
-        least: distance of two robots at any time, as a share of what is demanded.
+        stopped: robots that stopped for good.
+        arrived: others that arrived.
+        named: others that wait, directly or through others, for one that stopped.
+        unnamed: others that did not arrive for no known reason.
+        least: least distance of two robots at any time, as a fraction of what is demanded.
     """
 
     robots: int
@@ -33,17 +35,17 @@ class Late:
 
 
 def late(motion: Motion, demanded: float, random: np.random.Generator, stops: float) -> Late:
-    """Step robots along their paths until none gets on.
+    """Step robots along their paths until none can move on.
 
     Args:
-        demanded: how far apart they are to stay, px.
-        stops: share of robots that stop for good somewhere on their way.
+        demanded: distance that they must keep, px.
+        stops: fraction of robots that stop for good somewhere on their way.
     """
     following, n = Following(motion), len(motion.paths)
     lengths = following.lengths
     stop = np.where(random.random(n) < stops, random.random(n) * lengths, np.inf)
     share, progress, least = random.uniform(0.1, 1.0, n), np.zeros(n), np.inf
-    # One table of all vertices: how far along its path each is, after those of the paths before.
+    # One sorted table of all vertices: arc length along the path, offset by all paths before it.
     before = np.concatenate([[0.0], np.cumsum(lengths + 1.0)])
     paths = zip(motion.paths.values(), before[:-1], strict=True)
     vertices = np.concatenate([arc_lengths(path) + base for path, base in paths])
@@ -70,17 +72,18 @@ def late(motion: Motion, demanded: float, random: np.random.Generator, stops: fl
 
 
 def _waits(robot: str, waits: dict[str, str], stopped: set[str]) -> bool:
-    """Whether a robot waits for one that stopped, or for one that does so."""
+    """Return whether a robot waits, directly or through others, for one that stopped."""
     for _ in range(len(waits)):
         robot = waits.get(robot, robot)
     return robot in stopped
 
 
 def closest(begin: FloatArray, end: FloatArray, reach: float) -> float:
-    """The least distance of two robots that drive straight from (n, 2) to (n, 2) px meanwhile.
+    """Return the least distance of two robots while all drive straight from `begin` to `end`.
 
     Args:
-        reach: pairs that are farther apart at first are left out; at least what they drive.
+        begin: positions, (n, 2) px; `end` likewise.
+        reach: pairs farther apart than this at first are left out, px; at least what they drive.
     """
     pairs = cKDTree(begin).query_pairs(reach, output_type="ndarray")
     one, other = pairs.T

@@ -1,4 +1,4 @@
-"""The scenes of `motion_scenes` with pyrvo: robots avoid each other on shortest ways (ORCA)."""
+"""The scenes of `motion_scenes` with pyrvo: robots on shortest paths avoid each other (ORCA)."""
 
 import time
 from dataclasses import dataclass
@@ -15,23 +15,23 @@ from .motion_late import closest
 from .motion_scenes import RADIUS, SPEED, Scene
 
 PERIOD = 0.0125
-"""Seconds of a step: robots drive less than half a radius in it."""
+"""Seconds of a step, in which robots drive less than half a radius."""
 NEIGHBOURS, NEAR, HORIZON = 20, 20 * RADIUS, 0.3
-"""How many robots each one avoids, within how many px and for how many seconds: the best of five
-settings, as it overlaps least and is done soonest."""
+"""Most neighbours that a robot avoids, within what distance, px, and for how many seconds: of five
+settings, the one that overlaps least and is done soonest."""
 LONGEST, MORE = 5.0, 10.0
-"""A run ends after so many times the bound, and so many seconds."""
+"""A run ends at the latest after this multiple of the bound, plus this many seconds."""
 LOOKING = 20
-"""Robots look every so many steps which point of their way they see."""
+"""Steps between choosing anew the farthest visible point of each robot's path."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """What came of a run.
+    """The result of a run.
 
     Attributes:
-        arrived: share of robots.
-        separation: least distance of two robots at any time, as a share of two radii.
+        arrived: fraction of robots that arrived.
+        separation: least distance of two robots at any time, as a fraction of two radii.
         seconds: until the last one arrived, or the run was ended.
         spent: CPU seconds.
     """
@@ -43,10 +43,10 @@ class Ended:
 
 
 def orca(of: Scene, least: float) -> Ended:
-    """Step robots towards the farthest point of their way that they see.
+    """Step robots towards the farthest point of their path that they see.
 
     Args:
-        least: seconds that they take at least.
+        least: lower bound of the makespan, seconds.
     """
     began = time.process_time()
     team, solid = of.team(0.0), of.ground.solid
@@ -88,12 +88,12 @@ def _simulator(of: Scene, starts: FloatArray) -> Any:
 
 
 def _aims(points: FloatArray, ways: list[FloatArray], barrier: shapely.Geometry) -> FloatArray:
-    """The farthest point of each way that is seen from where its robot is, (n, 2) px."""
+    """Return the farthest point of each path that its robot sees, (n, 2) px; if none, its end."""
     robot = np.repeat(np.arange(len(ways)), [len(way) for way in ways])
     ends = np.concatenate(ways)
     lines = shapely.linestrings(np.stack([points[robot], ends], axis=1))
     seen = np.flatnonzero(~shapely.intersects(lines, barrier))
     last = np.arange(len(robot))[np.append(np.diff(robot) > 0, True)]
     found = ends[last]
-    found[robot[seen]] = ends[seen]  # the last of each robot stays
+    found[robot[seen]] = ends[seen]  # the last one assigned for a robot wins
     return found

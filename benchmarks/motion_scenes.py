@@ -1,7 +1,7 @@
 """Seeded scenes of robots that drive to a formation, for the benchmarks of motion.
 
-Outlines (squares, Ls, Cs, things of the photographs), starts (random, packed in a corner, in two
-opposite corners), relations, and things around the target that no robot may drive over.
+They vary outlines (squares, Ls, Cs, things in the photographs), starts (random, packed in a corner,
+in two opposite corners), relations, and things around the target that no robot may drive over.
 """
 
 import math
@@ -29,13 +29,13 @@ from ..tools.motion.planning import Ground, Team, assigned
 from ..tools.motion.routes import named_obstacles
 
 RADIUS, SPEED = 3.0, 100.0
-"""Of a robot, px and px/s."""
+"""Radius and speed of a robot, px and px/s."""
 ROOM = 5_000.0
-"""Picture for each robot, px^2, in a picture of 640 x 480 at least."""
+"""Area of the picture per robot, px^2; the picture is at least 640 x 480."""
 PITCH, RANDOM_PITCH = 2.6 * RADIUS, 2.1 * RADIUS
-"""How far apart robots start that are packed, and random ones at least, px."""
+"""Distance between packed starts, and least distance between random ones, px."""
 TARGET = (0.15, 0.45)
-"""How large targets are, as a share of the picture's shorter side."""
+"""Range of the size of targets, as a fraction of the picture's shorter side."""
 TRIES = 60
 DRAWN = {
     "square": ((0, 0), (1, 0), (1, 1), (0, 1)),
@@ -50,7 +50,7 @@ SIDES = ("left", "right", "top", "bottom")
 
 @dataclass(frozen=True)
 class Scene:
-    """What is to be driven: the plan, where it stands, and where robots start, (n, 2) px."""
+    """A drive: the plan, its site, and where robots start, (n, 2) px."""
 
     name: str
     plan: Plan
@@ -64,18 +64,18 @@ class Scene:
 
     @cached_property
     def ground(self) -> Ground:
-        """What robots drive around."""
+        """The obstacles that robots drive around."""
         return Ground(named_obstacles(self.plan.formation.contract, self.site), self.site)
 
     def poses(self) -> list[Pose]:
-        """Of all robots, seen where they start."""
+        """Return the poses of all robots at their starts."""
         return [Pose(str(i), float(x), float(y)) for i, (x, y) in enumerate(self.starts, start=1)]
 
     def team(self, error: float) -> Team:
-        """The robots, each in the row of its place, as a plan gives them out.
+        """Return the robots, each in the row of the place assigned to it.
 
         Args:
-            error: how far they may come off their paths, px.
+            error: how far they may deviate from their paths, px.
         """
         if len(self.starts) > EXACT:
             rows = np.array([int(i) - 1 for i in assign_robots(self.poses(), self.goals).robots])
@@ -85,7 +85,11 @@ class Scene:
 
 
 def scene(seed: int, robots: int, starts: str | None = None) -> Scene:
-    """The scene of a seed: shapes, starts and relations in turn, a relation where it fits."""
+    """Return the scene of a seed, which cycles through shapes, starts and relations that fit.
+
+    Raises:
+        ValueError: no relation fits.
+    """
     random = np.random.default_rng([seed, robots])
     scale = max(1.0, math.sqrt(ROOM * robots / (640 * 480)))
     size = 640 * scale, 480 * scale
@@ -107,7 +111,7 @@ def _made(
     relation: str,
     robots: int,
 ) -> Scene | None:
-    """A scene, or None where the formation or the robots do not fit."""
+    """Return a scene; None if the formation or the robots do not fit."""
     middle, side = np.array(size) / 2, min(size)
     things = {
         "t1": _outline(
@@ -141,14 +145,14 @@ def _made(
 
 @lru_cache(maxsize=1)
 def _real() -> Sequence[Polygon]:
-    """The things of the photographs as they are outlined by hand."""
+    """Return the things in the photographs, as outlined by hand."""
     things = [t for e in read_entries(PHOTOS / ANNOTATIONS) for t in e["objects"]]
     parts = [largest_part(Polygon(thing["polygon"]).buffer(0)) for thing in things]
     return [part for part in parts if part is not None]
 
 
 def _outline(random: np.random.Generator, shape: str, centre: FloatArray, size: float) -> Polygon:
-    """Such a shape, turned, with its longer side of so many px, around a centre, (2,) px."""
+    """Return a shape, randomly turned, its longer side `size` px, at a centre (2,) px."""
     real = _real()
     drawn = real[int(random.integers(len(real)))] if shape == "real" else Polygon(DRAWN[shape])
     x0, y0, x1, y1 = drawn.bounds
@@ -165,7 +169,7 @@ def _starts(
     taken: BaseGeometry,
     robots: int,
 ) -> FloatArray | None:
-    """Where so many robots start, off what is taken, (n, 2) px."""
+    """Return starts off the region taken, (robots, 2) px; None if there is no room."""
     edge = 1.5 * RADIUS
     if kind == "random":
         points = random.uniform(edge, np.array(size) - edge, (10 * robots + 50, 2))
@@ -186,7 +190,7 @@ def _starts(
 def _block(
     size: tuple[float, float], corner: tuple[int, int], taken: BaseGeometry, robots: int
 ) -> FloatArray:
-    """Robots packed in a corner of the picture: 1 for the left or the top, -1 for the other."""
+    """Return starts packed in a corner, (n, 2) px: 1 is left or top, -1 is right or bottom."""
     columns = math.ceil(math.sqrt(robots))
     row, column = np.divmod(np.arange(4 * robots + 8 * columns), columns)
     points = 1.5 * RADIUS + PITCH * np.stack([column, row], axis=1)

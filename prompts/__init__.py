@@ -1,4 +1,4 @@
-"""What the model is told: versioned prompt files, found by `id@vNNN` and known by their hash."""
+"""The texts sent to the model: versioned prompt files, named `id@vNNN` and identified by hash."""
 
 from .library import PromptLibrary
 from .prompt import Prompt, PromptError
@@ -13,6 +13,6 @@ def load_prompt(name: str) -> Prompt:
         name: `id@vNNN`, such as former@v001, or an id alone for its current version.
 
     Raises:
-        PromptError: there is none of that name.
+        PromptError: there is no prompt of that name.
     """
     return PromptLibrary().load(name)

@@ -1,4 +1,4 @@
-"""Reading and writing files of prompts: whole or not at all, never over one that is released."""
+"""Reading and writing of prompt files: atomically, and never over a released one."""
 
 import os
 import sys
@@ -12,23 +12,23 @@ from typing import BinaryIO
 from .prompt import PromptError
 
 MAX_BYTES = 1 << 20
-"""Of one file; a prompt is a few thousand."""
+"""Largest size of one file in bytes; a prompt has a few thousand."""
 PATIENCE = 10.0
-"""Seconds to wait while another process writes in the folder."""
+"""How long to wait, in seconds, while another process writes in the folder."""
 BUSY = ".writing"
-"""The file that is locked while somebody writes in the folder; by itself it means nothing."""
+"""The file locked while a process writes in the folder; its mere presence means nothing."""
 
 
 def read_text(path: Path) -> str:
-    """The text of a file, line ends as LF.
+    """Return the text of a file, with line ends as LF.
 
     Raises:
-        PromptError: it cannot be read, is too large or not UTF-8.
+        PromptError: the file cannot be read, is too large, or is not UTF-8.
     """
     try:
         if path.stat().st_size > MAX_BYTES:
             raise PromptError(f"{path} has more than {MAX_BYTES >> 20} MiB.")
-        return path.read_text(encoding="utf-8-sig")  # some editors put a mark at the beginning
+        return path.read_text(encoding="utf-8-sig")  # some editors write a byte order mark
     except OSError as error:
         raise PromptError(f"{path} cannot be read: {error.strerror or error}.") from None
     except UnicodeDecodeError:
@@ -36,24 +36,24 @@ def read_text(path: Path) -> str:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a file at once or not at all, in the place of what is there.
+    """Write a file atomically, replacing any that is there.
 
     Raises:
-        PromptError: it cannot be written there.
+        PromptError: the file cannot be written.
     """
     with _as_prompt_errors(path), _temporary_beside(path, text) as written:
         written.replace(path)
 
 
 def write_new(path: Path, text: str) -> None:
-    """Write a file at once or not at all where there is none.
+    """Write a new file atomically.
 
     Raises:
-        PromptError: there is one, or it cannot be written there.
+        PromptError: the file exists already or cannot be written.
     """
     with _as_prompt_errors(path), _temporary_beside(path, text) as written:
         try:
-            os.link(written, path)  # unlike a renaming it fails where there is a file
+            os.link(written, path)  # unlike a rename, this fails if the file exists
         except FileExistsError:
             raise
         except OSError:  # this file system may have no hard links
@@ -62,10 +62,11 @@ def write_new(path: Path, text: str) -> None:
 
 @contextmanager
 def locked_folder(folder: Path) -> Generator[None]:
-    """The only one to write in a folder; the system lets go of it when a process ends.
+    """Hold the exclusive right to write in a folder; the system frees it if the process ends.
 
     Raises:
-        PromptError: somebody else is still at it, or it cannot be written there.
+        PromptError: another process is still writing after `PATIENCE`, or the folder cannot be
+            written.
     """
     path, until = folder / BUSY, time.monotonic() + PATIENCE
     with _as_prompt_errors(folder):
@@ -78,13 +79,13 @@ def locked_folder(folder: Path) -> Generator[None]:
     try:
         yield
     finally:
-        with suppress(OSError):  # Windows deletes no open file; it may lie there
+        with suppress(OSError):  # Windows cannot delete an open file; it may stay
             path.unlink()
         busy.close()
 
 
 def _rename_new(written: Path, path: Path) -> None:
-    """Rename where there is no file: an empty one of our own takes the place first."""
+    """Rename to a path that has no file yet, by first claiming it with an empty one."""
     path.open("xb").close()
     try:
         written.replace(path)
@@ -94,7 +95,7 @@ def _rename_new(written: Path, path: Path) -> None:
 
 
 def try_lock(path: Path) -> BinaryIO | None:
-    """The file, locked; None while another has it, or has just deleted it."""
+    """Return the file, open and locked; None if another process holds or has just deleted it."""
     with ExitStack() as stack:
         file = stack.enter_context(path.open("ab"))
         with suppress(FileNotFoundError):
@@ -105,7 +106,7 @@ def try_lock(path: Path) -> BinaryIO | None:
 
 
 def lock(handle: int) -> bool:
-    """Whether the lock of an open file could be had; the system keeps it until it is closed."""
+    """Try to lock an open file and return whether it worked; closing the file frees the lock."""
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -122,13 +123,13 @@ def lock(handle: int) -> bool:
 
 @contextmanager
 def _temporary_beside(path: Path, text: str) -> Generator[Path]:
-    """The text in a file of its own in the same folder, gone when done."""
+    """Yield a temporary file in the same folder that holds the text; delete it afterwards."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     written = Path(name)
     try:
         with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
             file.write(text)
-        written.chmod(0o644)  # others may read it, as they may what an editor writes
+        written.chmod(0o644)  # readable by others, as a file saved by an editor is
         yield written
     finally:
         with suppress(FileNotFoundError):

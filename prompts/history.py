@@ -1,4 +1,4 @@
-"""What became of a prompt: how versions differ, when and why they were made, what came of what."""
+"""The history of prompts: how versions differ, when and why they were made, and from what."""
 
 import difflib
 import re
@@ -13,7 +13,14 @@ _ENTRY = re.compile(r"- ([0-9]{4}-[0-9]{2}-[0-9]{2}) (v[0-9]{3}) (released|curre
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of a changelog: a version was released, or became the current one."""
+    """A line of a changelog: a version was released or became the current one.
+
+    Attributes:
+        on: the date, YYYY-MM-DD.
+        name: `id@vNNN`.
+        what: `released` or `current`.
+        why: the reason given.
+    """
 
     on: str
     name: str
@@ -22,7 +29,7 @@ class Entry:
 
 
 def diff(old: Prompt, new: Prompt) -> list[str]:
-    """The lines of two unified diffs, of the front matter and of the text, partials put in."""
+    """Return two unified diffs as lines: of the front matter, and of the text with its partials."""
     lines: list[str] = []
     heads = [split_file(p.name, p.source)[0] for p in (old, new)]
     for what, before, after in (("front matter", *heads), ("text", old.text, new.text)):
@@ -33,7 +40,7 @@ def diff(old: Prompt, new: Prompt) -> list[str]:
 
 
 def log(library: PromptLibrary, id: str) -> list[Entry]:
-    """The entries of an id's changelog, oldest first; other lines of it are left out.
+    """Return the entries of an id's changelog, oldest first, skipping any other lines.
 
     Raises:
         PromptError: there is no such id, or its changelog cannot be read.
@@ -47,9 +54,9 @@ def log(library: PromptLibrary, id: str) -> list[Entry]:
 
 
 def lineage(prompts: list[Prompt]) -> dict[str | None, list[str]]:
-    """Names by the parent they were made from; under None those whose parent is not among them.
+    """Group the names by parent; those whose parent is not among the prompts come under None.
 
-    A prompt that is its own forebear, which only a hand can write, is under None as well.
+    So does a prompt that is its own ancestor, which only editing by hand can bring about.
     """
     parents = {p.name: p.front.parent for p in prompts}
     children: dict[str | None, list[str]] = {}

@@ -1,4 +1,4 @@
-"""The typed inputs of a prompt: what a value must be, and how it is written into the text."""
+"""The typed inputs of a prompt: which values are allowed and how they are written in the text."""
 
 import json
 import math
@@ -29,18 +29,18 @@ InputName = Annotated[
     str, BeforeValidator(_quoted_name), StringConstraints(pattern=r"^[a-z_][a-z0-9_]*$")
 ]
 LARGEST = 2**63
-"""Whole numbers stay below it, either way."""
+"""The magnitude of an integer must be less than this."""
 
 
 class Input(BaseModel):
     """One input of a prompt.
 
     Attributes:
-        min: least number allowed; `max` likewise.
-        max_chars: of a string.
-        enum: the values allowed, if not all.
-        example: a value, for whoever tries the prompt.
-        default: taken where no value is given; a run gives none.
+        min: smallest number allowed; `max` is the largest.
+        max_chars: largest length of a string.
+        enum: the only values allowed; if empty, any.
+        example: a sample value for trying the prompt out.
+        default: used if no value is given; a run gives none.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -56,7 +56,7 @@ class Input(BaseModel):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        """Bounds suit the type, and the values named suit both."""
+        """Check that the bounds suit the type, and that example, default and enum suit both."""
         if self.type not in ("integer", "number") and (self.min, self.max) != (None, None):
             raise ValueError(f"min and max are for numbers, not for a {self.type}")
         if self.type != "string" and self.max_chars is not None:
@@ -69,7 +69,7 @@ class Input(BaseModel):
         return self
 
     def problem(self, value: object) -> str | None:
-        """What is wrong with a value, as the rest of a sentence; None if it will do."""
+        """Return what is wrong with a value, as the rest of a sentence; None if it is valid."""
         shown = _short_repr(value)
         if not self._is_of_type(value):
             return f"{shown} is no {self.type}"
@@ -85,11 +85,11 @@ class Input(BaseModel):
         return None
 
     def written(self, value: object) -> str:
-        """A value as it stands in the text: strings as they are, the rest as JSON has it."""
+        """Return a value as it is written in the text: a string as it is, others as JSON."""
         return value if isinstance(value, str) else json.dumps(value)
 
     def read(self, text: str) -> object:
-        """A value from what a person has typed; the text itself where it is none of the type."""
+        """Parse what a person typed: a string as it is, others as JSON; the text if that fails."""
         try:
             return text if self.type == "string" else json.loads(text)
         except (ValueError, RecursionError):
@@ -108,6 +108,6 @@ class Input(BaseModel):
 def _short_repr(value: object) -> str:
     try:
         text = repr(value)
-    except ValueError:  # Python writes no whole numbers of thousands of digits
+    except ValueError:  # Python refuses to print integers of thousands of digits
         return "a vast number"
     return text if len(text) < 60 else f"{text[:57]}..."

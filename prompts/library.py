@@ -1,6 +1,6 @@
-"""Where prompts are found: those shipped and, on top, those of a folder of one's own.
+"""The lookup of prompts: the shipped ones, overlaid by those of the user's own folder.
 
-An id in one's own folder stands for itself as a whole: no version of it is taken from elsewhere.
+An id in the user's folder hides the shipped id as a whole, with all its versions.
 """
 
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ class PromptLibrary:
     """Prompts by name.
 
     Args:
-        folder: one's own; None for the shipped prompts alone.
+        folder: the user's own folder; None for the shipped prompts alone.
     """
 
     folder: Path | None = None
 
     def ids(self) -> list[str]:
-        """All ids, sorted.
+        """Return all ids, sorted.
 
         Raises:
-            PromptError: one's own folder is none.
+            PromptError: the user's folder is not a directory.
         """
         if self.folder is not None and not self.folder.is_dir():
             raise PromptError(
@@ -39,21 +39,21 @@ class PromptLibrary:
         return sorted({id for folder in folders for id in ids_in(folder)})
 
     def names(self) -> list[str]:
-        """All names, sorted: `id@vNNN`, and `id@draft-NAME` before them."""
+        """Return all names, sorted by id: `id@draft-NAME` first, then `id@vNNN`."""
         return [name for id in self.ids() for name in names_in(self.home(id), id)]
 
     def home(self, id: str) -> Path:
-        """The folder of prompts that an id is taken from."""
+        """Return the folder of prompts that an id is read from."""
         own = self.folder is not None and id in ids_in(self.folder)
         return self.folder if own and self.folder is not None else SHIPPED
 
     def path(self, name: str) -> Path:
-        """The file of a name that is known."""
+        """Return the file of a prompt that is known to exist."""
         id, _, version = name.partition("@")
         return self.home(id) / id / f"{version}{_END}"
 
     def current(self, id: str) -> str:
-        """The name of the version that an id alone stands for, which its CURRENT names.
+        """Return the name of an id's current version, which its CURRENT file states.
 
         Raises:
             PromptError: there is no such id, or CURRENT does not name one of its versions.
@@ -72,10 +72,10 @@ class PromptLibrary:
         return name
 
     def resolve(self, name: str) -> str:
-        """The full name of a prompt, which an id alone gives for its current version.
+        """Return the full name of a prompt; an id alone stands for its current version.
 
         Raises:
-            PromptError: there is none of that name.
+            PromptError: there is no prompt of that name.
         """
         name = name if "@" in name else self.current(name)
         if name not in self.names():
@@ -89,8 +89,8 @@ class PromptLibrary:
             name: `id@vNNN`, `id@draft-NAME`, or an id alone for its current version.
 
         Raises:
-            PromptError: there is none of that name, it is no prompt, or it was released and is
-                not what it was then.
+            PromptError: there is no prompt of that name, its file is not a valid prompt, or it
+                is numbered as a version but was never released or was changed since.
         """
         name = self.resolve(name)
         home, path = self.home(name.partition("@")[0]), self.path(name)
@@ -109,22 +109,22 @@ class PromptLibrary:
 
 
 def ids_in(folder: Path) -> list[str]:
-    """Ids of the prompts of one folder."""
+    """Return the ids of the prompts of one folder, sorted."""
     found = {path.parent.name for path in folder.glob(f"*/*{_END}")} - {PARTIALS}
     return sorted(id for id in found if NAME.fullmatch(f"{id}@v001"))
 
 
 def names_in(folder: Path, id: str) -> list[str]:
-    """Names of the prompts of an id in one folder, sorted."""
+    """Return the names of an id's prompts in one folder, sorted."""
     tags = [path.name.removesuffix(_END) for path in (folder / id).glob(f"*{_END}")]
     return sorted(f"{id}@{t}" for t in tags if NAME.fullmatch(f"{id}@{t}"))
 
 
 def read_partial(home: Path, ref: str, lock: dict[str, Locked]) -> str:
-    """The text of a partial, without the blank lines around it.
+    """Return the text of a partial, stripped of surrounding white space.
 
     Raises:
-        PromptError: it is not there, or was released and is not what it was then.
+        PromptError: its file cannot be read, or was changed after its release.
     """
     name, _, version = ref.partition("@")
     path = home / PARTIALS / name / f"{version}.md"

@@ -1,4 +1,4 @@
-"""What is wrong with a prompt, or likely to be, that can be seen without running it."""
+"""A linter for prompts: errors and likely errors that show without running them."""
 
 import re
 import unicodedata
@@ -11,9 +11,9 @@ from .lock import read_lock
 from .prompt import NAME, VARIABLE, Prompt, PromptError
 
 LINE = 100
-"""Characters of a line that is still read at a glance."""
+"""Longest line, in characters, that can still be read at a glance."""
 TOKENS, CHARACTERS = 1500, 4
-"""Tokens a prompt may take, at so many characters each: more is paid anew with every request."""
+"""Token budget of a prompt, and characters per token; every request pays for the tokens again."""
 _SECRET = re.compile(
     r"\b(?:sk|pk|rk)[-_][A-Za-z0-9_-]{16,}|\bAIza[A-Za-z0-9_-]{30,}|\bgh[pousr]_[A-Za-z0-9]{20,}"
     r"|\bgithub_pat_\w{20,}|\bAKIA[A-Z0-9]{16}\b|\bxox[abprs]-[A-Za-z0-9-]{10,}|\bhf_[A-Za-z0-9]{20,}"
@@ -36,7 +36,7 @@ _COUNT = re.compile(
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about one prompt: an error is wrong whoever reads it, a warning may be meant."""
+    """A finding about one prompt: an error is always wrong, a warning may be intended."""
 
     prompt: str
     rule: str
@@ -45,10 +45,10 @@ class Finding:
 
 
 def lint(library: PromptLibrary, names: Iterable[str] | None = None) -> list[Finding]:
-    """What is wrong with prompts, all of it; with None, with all prompts and their folders.
+    """Return all findings about the named prompts; for None, about all prompts and their folders.
 
     Raises:
-        PromptError: a name is none, or one's own folder cannot be read.
+        PromptError: there is no prompt of a name, or the user's folder cannot be read.
     """
     chosen = library.names() if names is None else [library.resolve(n) for n in names]
     found = [finding for name in chosen for finding in _lint_prompt(library, name)]
@@ -58,7 +58,7 @@ def lint(library: PromptLibrary, names: Iterable[str] | None = None) -> list[Fin
 
 
 def _lint_prompt(library: PromptLibrary, name: str) -> list[Finding]:
-    """One prompt, which may be too broken to be read."""
+    """Lint one prompt; one that cannot be loaded gives a single error."""
     try:
         prompt = library.load(name)
     except PromptError as error:
@@ -71,7 +71,7 @@ def _lint_prompt(library: PromptLibrary, name: str) -> list[Finding]:
 
 
 def _lint_folder(library: PromptLibrary, id: str) -> Iterator[Finding]:
-    """What stands in the folder of an id, whatever versions it has."""
+    """Lint the folder of an id: missing released files, CURRENT, and file names."""
     home = library.home(id)
     names = names_in(home, id)
     try:
@@ -91,7 +91,7 @@ def _lint_folder(library: PromptLibrary, id: str) -> Iterator[Finding]:
 
 
 def _lint_source(prompt: Prompt) -> Iterator[Finding]:
-    """Line by line."""
+    """Lint the source line by line."""
     for number, line in enumerate(prompt.source.splitlines(), start=1):
         if line != line.rstrip():
             yield _error(prompt, "spaces", f"Line {number} ends in spaces; models read them too.")
@@ -109,7 +109,7 @@ def _lint_source(prompt: Prompt) -> Iterator[Finding]:
 
 
 def _lint_text(prompt: Prompt) -> Iterator[Finding]:
-    """As the model is told it, and what is said about it."""
+    """Lint the text sent to the model, and the metadata about it."""
     front, text = prompt.front, prompt.text
     odd = [braces for braces in _BRACES.findall(text) if not VARIABLE.fullmatch(braces)]
     for braces in sorted(set(odd)):
@@ -141,7 +141,7 @@ _FRAME = {"their unit": _UNIT, "which way y runs": _ORIGIN}
 
 
 def _lint_counts(prompt: Prompt) -> Iterator[Finding]:
-    """Different numbers of the same thing, such as 8 to 12 vertices here and 20 vertices there."""
+    """Warn of different counts of one noun, such as 8 to 12 vertices here and 20 vertices there."""
     found: dict[str, dict[str, str]] = {}
     for match in _COUNT.finditer(prompt.text):
         low, high, noun = match.groups()
@@ -163,11 +163,11 @@ def _digits(number: str) -> str:
 
 
 _PLAIN = " \t\u200c\u200d"
-"""Spaces, and the joiners that some scripts are written with."""
+"""Space, tab, and the zero-width joiners that some scripts need."""
 
 
 def _confusable(line: str) -> Iterator[str]:
-    """Invisible characters, odd spaces, lookalikes of ASCII, and letters foreign to their word."""
+    """Yield invisible characters, odd spaces, ASCII lookalikes and foreign letters in a word."""
     for char in line:
         hidden = unicodedata.category(char) in ("Cf", "Zs", "Cc", "Co") and char not in _PLAIN
         compatible = not char.isascii() and unicodedata.normalize("NFKC", char).isascii()

@@ -1,4 +1,4 @@
-"""LOCK.json: the hashes of all that was released in a folder of prompts, so that it stays so."""
+"""LOCK.json: the hashes of everything released in a folder of prompts, to detect later changes."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,12 +12,12 @@ NAME = "LOCK.json"
 
 
 class Locked(BaseModel):
-    """What was released.
+    """The lock of one released prompt or partial.
 
     Attributes:
-        sha256: of the text, its partials put in.
-        file_sha256: of the file, line ends as LF.
-        tools: hash of each tool's schema as it was then, by name; empty where none was kept.
+        sha256: hash of the text, partials inserted.
+        file_sha256: hash of the file, with line ends as LF.
+        tools: hash of each tool's schema at the release, by name; empty if none were stored.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -32,7 +32,7 @@ class _Lock(RootModel[dict[str, Locked]]):
 
 
 def read_lock(folder: Path) -> dict[str, Locked]:
-    """What was released in a folder: prompts as `id@vNNN`, partials as `partials/name@vNNN`.
+    """Return a folder's locks: of prompts by `id@vNNN`, of partials by `partials/name@vNNN`.
 
     Raises:
         PromptError: LOCK.json cannot be read, or is damaged.

@@ -1,6 +1,6 @@
-"""What a prompt is: a file of front matter and text, in which {{name}} stands for an input.
+"""A prompt: a file of front matter and text, in which {{name}} stands for an input or a partial.
 
-Nothing else is special in the text: no logic, no escaping, no spaces within the braces.
+Nothing else in the text is special: no logic, no escaping, no spaces within the braces.
 """
 
 import hashlib
@@ -27,18 +27,18 @@ _Partial = Annotated[str, StringConstraints(pattern=rf"^{PARTIAL.pattern}$")]
 
 
 class PromptError(ValueError):
-    """A prompt that cannot be found, read, rendered or written; the text says what would do."""
+    """A prompt that cannot be found, read, rendered or written; the message says how to fix it."""
 
 
 class FrontMatter(BaseModel):
-    """What stands between the lines --- at the head of a prompt's file.
+    """The front matter of a prompt's file, between the lines --- at its head.
 
     Attributes:
         version: the number of a released version; drafts have none.
-        parent: `id@vNNN` of the version it was made from.
+        parent: name of the prompt it was made from.
         hypothesis: what it is expected to do better.
-        tools: names of the tools a model is offered with it; none stands for all.
-        include: partials, `name@vNNN` each, put where the text says {{name}}.
+        tools: names of the tools offered to the model with it; if empty, all.
+        include: partials, each `name@vNNN`, inserted where the text says {{name}}.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -62,8 +62,8 @@ class Prompt:
 
     Attributes:
         version: its number, or `draft-NAME`.
-        text: of the body, its partials put in, its inputs not.
-        source: the whole file, line ends as LF.
+        text: the body, with its partials inserted but not its inputs.
+        source: the whole file, with line ends as LF.
     """
 
     front: FrontMatter
@@ -73,22 +73,22 @@ class Prompt:
 
     @property
     def id(self) -> str:
-        """What the prompt is for; versions share it."""
+        """The id, which all versions of a prompt share."""
         return self.front.id
 
     @property
     def tools(self) -> tuple[str, ...]:
-        """Names of the tools a model is offered with it; none stands for all."""
+        """Names of the tools offered to the model with it; if empty, all."""
         return self.front.tools
 
     @property
     def sha256(self) -> str:
-        """Hash of the text: what results name, so that new metadata are no new prompt."""
+        """Hash of the text; results cite it, so that changed metadata do not make a new prompt."""
         return hash_of(self.text)
 
     @property
     def file_sha256(self) -> str:
-        """Hash of the file, line ends as LF: inputs, tools and the rest are in it."""
+        """Hash of the file, with line ends as LF; covers inputs, tools and all other metadata."""
         return hash_of(self.source)
 
     @property
@@ -98,7 +98,7 @@ class Prompt:
 
     @property
     def facts(self) -> dict[str, str | int]:
-        """What reports and traces say of it."""
+        """The facts that reports and traces record about it."""
         return {
             "id": self.id,
             "version": self.version,
@@ -107,10 +107,10 @@ class Prompt:
         }
 
     def render(self, values: Mapping[str, object] | None = None) -> str:
-        """The text with values in the place of inputs; those left out take their default.
+        """Return the text with values in place of the inputs; a value left out is its default.
 
         Raises:
-            PromptError: unknown names, missing values, or values the inputs do not allow.
+            PromptError: a name is unknown, a value is missing, or an input does not allow it.
         """
         inputs = self.front.inputs
         given = {n: i.default for n, i in inputs.items() if i.default is not None} | dict(
@@ -132,25 +132,25 @@ class Prompt:
 
 
 def hash_of(text: str) -> str:
-    """SHA-256 of a text in UTF-8, in hexadecimal."""
+    """Return the SHA-256 of a text in UTF-8, in hexadecimal."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def tag(version: int | str) -> str:
-    """`vNNN` of a number; a draft's is its own."""
+    """Return `vNNN` for a number, and a draft's `draft-NAME` as it is."""
     return f"v{version:03d}" if isinstance(version, int) else version
 
 
 def parse_prompt(name: str, source: str, partial: Callable[[str], str]) -> Prompt:
-    """A prompt from its file.
+    """Parse a prompt from its file.
 
     Args:
-        name: what the file's place says it is, `id@vNNN` or `id@draft-NAME`.
-        source: the file, line ends as LF.
-        partial: gives the text of a partial by its `name@vNNN`.
+        name: `id@vNNN` or `id@draft-NAME`, as the file's path has it.
+        source: the file, with line ends as LF.
+        partial: returns the text of a partial, given its `name@vNNN`.
 
     Raises:
-        PromptError: it is no prompt; all that is wrong with it.
+        PromptError: the file is not a valid prompt; names all problems found.
     """
     head, below = split_file(name, source)
     front = _front_matter(name, head)
@@ -172,10 +172,10 @@ def parse_prompt(name: str, source: str, partial: Callable[[str], str]) -> Promp
 
 
 def split_file(name: str, source: str) -> tuple[str, str]:
-    """The front matter of a file and what is below it.
+    """Return the front matter of a file and the text below it.
 
     Raises:
-        PromptError: it has none.
+        PromptError: the file has no front matter.
     """
     match = _FILE.fullmatch(source)
     if match is None:
@@ -184,7 +184,7 @@ def split_file(name: str, source: str) -> tuple[str, str]:
 
 
 def _variable_problems(front: FrontMatter, body: list[str], expanded: list[str]) -> list[str]:
-    """Variables that are undeclared, unused or of two meanings."""
+    """Return one clause for each variable that is undeclared, unused or declared twice."""
     included = [ref.partition("@")[0] for ref in front.include]
     unused = [n for n in front.inputs if n not in expanded] + [n for n in included if n not in body]
     undeclared = sorted({n for n in expanded if n not in front.inputs})

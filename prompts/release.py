@@ -1,7 +1,7 @@
-"""From a draft to a released version, and from a released version to the current one.
+"""The life of a prompt: from a draft to a released version, and on to the current one.
 
-What is released is put where there is no file, never over another, and then entered in LOCK.json
-and CHANGELOG.md; one process at a time writes in a folder.
+A release never overwrites a file; it is then entered in LOCK.json and CHANGELOG.md. Only one
+process at a time writes in a folder.
 """
 
 import re
@@ -46,18 +46,20 @@ Say here what the model is to do.
 
 
 def new_draft(library: PromptLibrary, name: str, parent: str | None = None) -> Path:
-    """Begin a draft in one's own folder, which is made if need be.
+    """Create a draft in the user's folder, which is made if need be, and return its path.
 
     An id that only ships with formup is first copied there whole, so that its versions, its
     current one and the draft stand side by side.
 
     Args:
-        library: with a folder of one's own.
+        library: one with a user's folder.
         name: an id, or `id@draft-NAME`.
-        parent: what it starts from; None for the id's current version, or an empty one.
+        parent: the prompt to start from; None for the id's current version, or for an empty
+            template if it has none.
 
     Raises:
-        PromptError: no such name or parent, a draft of that name, or nowhere to write.
+        PromptError: the name is invalid or taken, there is no such parent, or the folder is
+            missing or cannot be written.
     """
     id, _, draft = name.partition("@")
     if not re.fullmatch(ID, id) or id == PARTIALS or (draft and not re.fullmatch(DRAFT, draft)):
@@ -93,17 +95,18 @@ def release(
     """Freeze a draft as the next version; the first of an id becomes current at once.
 
     Args:
-        library: with a folder of one's own.
+        library: one with a user's folder.
         name: `id@draft-NAME`, in that folder.
-        why: goes into the changelog.
-        on: the day.
-        tools: hashes of the tools' schemas as they are, by name.
+        why: the reason, for the changelog.
+        on: the date of the release.
+        tools: hashes of the tools' schemas as they are now, by name.
 
     Returns:
         The name of the version.
 
     Raises:
-        PromptError: it is no draft, cannot be used as it is, or cannot be written.
+        PromptError: it is not a draft in that folder, is not valid, or cannot be written; or
+            `why` is empty.
     """
     folder, reason = _own_folder(library), _required_reason(why)
     id = name.partition("@")[0]
@@ -134,14 +137,16 @@ def promote(library: PromptLibrary, name: str, because: str, on: date, after: st
     """Make a released version the current one.
 
     Args:
-        library: with a folder of one's own.
+        library: one with a user's folder.
         name: `id@vNNN`, in that folder.
-        because: goes into the changelog: what it was compared on, or why it was not.
-        on: the day.
-        after: the version it was compared with, which must be the current one still.
+        because: the reason, for the changelog: what it was compared on, or why it was not.
+        on: the date.
+        after: the version it was compared with, which must still be the current one; None if
+            it was not compared.
 
     Raises:
-        PromptError: it is not released, is current, or another has become current meanwhile.
+        PromptError: it is not released or not in that folder, is already current, or another
+            has become current meanwhile; or `because` is empty.
     """
     folder, reason = _own_folder(library), _required_reason(because)
     prompt = library.load(name)
@@ -163,7 +168,7 @@ def promote(library: PromptLibrary, name: str, because: str, on: date, after: st
 
 
 def _own_folder(library: PromptLibrary) -> Path:
-    """The folder that may be written in."""
+    """Return the user's folder; raise PromptError if there is none or it may not be written."""
     if library.folder is None:
         raise PromptError(
             "The prompts that ship with formup stay as they are; name a folder of your own with "
@@ -176,7 +181,7 @@ def _own_folder(library: PromptLibrary) -> Path:
 
 
 def _copy_shipped(id: str, folder: Path) -> None:
-    """A shipped id with all that is released of it, its partials and its part of LOCK.json."""
+    """Copy a shipped id to the folder: its released versions, partials and locks."""
     names = [n for n in names_in(SHIPPED, id) if "@v" in n]
     shipped, lock = read_lock(SHIPPED), read_lock(folder)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".copying.") as scratch:
@@ -189,7 +194,7 @@ def _copy_shipped(id: str, folder: Path) -> None:
 
 
 def _copy_partials(home: Path, refs: Iterable[str], folder: Path) -> None:
-    """Partials that are not there yet; they are locked with what is released with them."""
+    """Copy the partials that are missing; they are locked when a prompt with them is released."""
     for ref in refs:
         name, _, version = ref.partition("@")
         place = Path(PARTIALS) / name / f"{version}.md"
@@ -199,7 +204,7 @@ def _copy_partials(home: Path, refs: Iterable[str], folder: Path) -> None:
 
 
 def _draft_from(source: Prompt, id: str) -> str:
-    """The file of a draft that starts from a prompt."""
+    """Return the source of a draft that starts from a prompt."""
     front, body = split_file(source.name, source.source)
     front = _drop_keys(front, "id", "version", "parent", "hypothesis", "created")
     parent = f"parent: {source.name}\n" if isinstance(source.version, int) else ""
@@ -207,19 +212,19 @@ def _draft_from(source: Prompt, id: str) -> str:
 
 
 def _stamped(draft: Prompt, number: int, on: date) -> str:
-    """A draft's file as that of a version."""
+    """Return the source of a draft rewritten as that of a version."""
     front, body = split_file(draft.name, draft.source)
     rest = _drop_keys(front, "id", "version", "created")
     return f"---\nid: {draft.id}\nversion: {number}\ncreated: {on}\n{rest}---\n{body}"
 
 
 def _drop_keys(front: str, *keys: str) -> str:
-    """Front matter without keys and what is indented below them."""
+    """Return the front matter without the keys and what is indented below them."""
     return re.sub(rf"^({'|'.join(keys)}):.*\n(?:[ \t].*\n|\n)*", "", front, flags=re.MULTILINE)
 
 
 def _freeze(folder: Path, ref: str, lock: dict[str, Locked]) -> str:
-    """The text of a partial, which is released along with what includes it."""
+    """Lock a partial, unless it is locked already, and return its text."""
     name, _, version = ref.partition("@")
     source = read_text(folder / PARTIALS / name / f"{version}.md")
     locked = Locked(sha256=hash_of(source.strip()), file_sha256=hash_of(source))
@@ -228,7 +233,7 @@ def _freeze(folder: Path, ref: str, lock: dict[str, Locked]) -> str:
 
 
 def _publish(library: PromptLibrary, prompt: Prompt, lock: dict[str, Locked], entry: str) -> None:
-    """A version in its place, in LOCK.json and in the changelog; or none of it."""
+    """Write a version, then LOCK.json and the changelog; if LOCK.json fails, delete the version."""
     path, folder = library.path(prompt.name), library.home(prompt.id)
     write_new(path, prompt.source)
     try:

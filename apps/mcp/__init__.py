@@ -1,1 +1,1 @@
-"""`formup mcp`: the team for any client of the Model Context Protocol, over stdio and HTTP."""
+"""`formup mcp`: serves the team to any Model Context Protocol client, over stdio and HTTP."""

@@ -1,4 +1,4 @@
-"""Who calls, what they may reach, and how errors are told to a client."""
+"""Access control of the MCP server: who calls, what they may reach, which errors they see."""
 
 import asyncio
 import base64
@@ -16,7 +16,7 @@ from ...agent.conversation import Session
 from ...agent.service import Service
 from ...tools.errors import FormupError, InputError
 from ...tools.perception.image import Picture, load_picture
-from ..server.hub import Hub, check_owner, need
+from ..server.hub import Hub, check_owner, require_scope
 from ..server.sessions import checked_picture
 from ..server.tokens import Person, Scope
 
@@ -26,10 +26,10 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Access:
-    """What a server works with.
+    """What the MCP server has access to.
 
     Attributes:
-        folders: whose pictures may be opened by their paths; over HTTP none may.
+        folders: the folders whose pictures may be opened by path; none over HTTP.
     """
 
     hub: Hub
@@ -40,14 +40,14 @@ Ctx = Context[Access, Any]
 
 
 def caller(ctx: Ctx) -> tuple[Hub, Person]:
-    """The hub, and who calls: over HTTP whom the guard found, else the user of this machine."""
+    """Return the hub and the caller: over HTTP the guard's, otherwise this machine's user."""
     request = ctx.request_context.request
     person = Person() if request is None else request.state.person
     return ctx.request_context.lifespan_context.hub, person
 
 
-def told(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
-    """A tool or resource whose errors that were raised on purpose are told; others are masked."""
+def with_error_messages(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
+    """Wrap a tool or resource so that clients see the messages of `FormupError` and no others."""
 
     @wraps(work)
     async def telling(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -60,11 +60,11 @@ def told(work: Callable[P, Awaitable[R]]) -> Callable[P, Awaitable[R]]:
     return telling
 
 
-async def theirs(ctx: Ctx, session: str) -> Session:
-    """A session of whoever calls; those of others are as if they were not there.
+async def own_session(ctx: Ctx, session: str) -> Session:
+    """Return a session of the caller; the sessions of others count as missing.
 
     Raises:
-        InputError: there is none (`missing`).
+        InputError: the caller has no such session (`missing`).
     """
     hub, person = caller(ctx)
     try:
@@ -75,23 +75,23 @@ async def theirs(ctx: Ctx, session: str) -> Session:
         raise InputError(f"There is no session {session!r}.", "missing") from None
 
 
-async def permitted(ctx: Ctx, session: str, scope: Scope = "read") -> tuple[Service, Person]:
-    """The service, and who calls, where they may do that with a session.
+async def authorize(ctx: Ctx, session: str, scope: Scope = "read") -> tuple[Service, Person]:
+    """Return the service and the caller, once they are known to have the scope and the session.
 
     Raises:
-        InputError: they may not (`not_allowed`), or have no such session (`missing`).
+        InputError: they lack the scope (`not_allowed`), or have no such session (`missing`).
     """
     hub, person = caller(ctx)
-    need(person, scope)
-    await theirs(ctx, session)
+    require_scope(person, scope)
+    await own_session(ctx, session)
     return hub.service, person
 
 
 async def picture_named(ctx: Ctx, image: str) -> Picture:
-    """The picture that a client names: a data URL, else a file, over HTTP one of a session.
+    """Return the picture that a client names: a data URL, or a file, over HTTP a session's id.
 
     Raises:
-        InputError: there is none that may be used.
+        InputError: there is no such picture, or it may not be used.
     """
     hub, folders = caller(ctx)[0], ctx.request_context.lifespan_context.folders
     if image.startswith("data:"):
@@ -105,7 +105,7 @@ async def picture_named(ctx: Ctx, image: str) -> Picture:
     if folders:
         return await asyncio.to_thread(lambda: load_picture(_inside(image, folders)))
     try:
-        return (await theirs(ctx, image)).picture
+        return (await own_session(ctx, image)).picture
     except InputError as error:
         if error.kind != "missing":
             raise
@@ -117,14 +117,14 @@ async def picture_named(ctx: Ctx, image: str) -> Picture:
 
 
 def _inside(image: str, folders: Sequence[Path]) -> Path:
-    """The file of a path, links followed, where it lies in one of the folders."""
+    """Return a path, links resolved, if it lies in one of the folders; else raise InputError."""
     try:
         paths = [((folder / image).resolve(), folder.resolve()) for folder in folders]
         inside = [path for path, folder in paths if path.is_relative_to(folder)]
         if inside:
             return next((path for path in inside if path.exists()), inside[0])
     except (OSError, ValueError, RuntimeError):
-        pass  # no path at all
+        pass  # not a path at all
     there = ", ".join(map(str, folders))
     raise InputError(
         f"{image[:200]!r} is not inside {there}; formup mcp --pictures DIR allows another folder."

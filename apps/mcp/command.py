@@ -81,7 +81,7 @@ def mcp(
 
 
 async def _serve(hub: "Hub", work: Coroutine[Any, Any, None]) -> int:
-    """Until stdin is closed or a signal comes; what to exit with. Robots are held at the end."""
+    """Serve until stdin closes or a signal comes, then hold robots; return the exit code."""
     loop, serving = asyncio.get_running_loop(), asyncio.ensure_future(work)
     ended: asyncio.Future[int] = loop.create_future()
 

@@ -1,45 +1,45 @@
-"""What a client may read of a session, and a prompt that begins one."""
+"""MCP resources, through which a client reads a session, and a prompt that begins one."""
 
 import asyncio
 import json
 
 from mcp.server import MCPServer
 
-from .access import Access, Ctx, caller, theirs, told
-from .state import JPEG, planned, view
+from .access import Access, Ctx, caller, own_session, with_error_messages
+from .state import JPEG, plan_node, view
 
 ROOT = "formup://sessions/{session}"
 JSON = "application/json"
 
 
-@told
+@with_error_messages
 async def scene(ctx: Ctx, session: str) -> bytes:
     """The picture with rulers in px; what a question offers is outlined and numbered."""
-    return await asyncio.to_thread(view, await theirs(ctx, session))
+    return await asyncio.to_thread(view, await own_session(ctx, session))
 
 
-@told
+@with_error_messages
 async def plan(ctx: Ctx, session: str, plan_id: str) -> str:
     """A plan with its contract, positions and certificate, and what it was made from."""
-    return planned(await theirs(ctx, session), plan_id).model_dump_json()
+    return plan_node(await own_session(ctx, session), plan_id).model_dump_json()
 
 
-@told
+@with_error_messages
 async def certificate(ctx: Ctx, session: str, plan_id: str) -> str:
     """Whether a plan is as it was said to be: findings and measures."""
-    return planned(await theirs(ctx, session), plan_id).plan.verdict.model_dump_json()
+    return plan_node(await own_session(ctx, session), plan_id).plan.verdict.model_dump_json()
 
 
-@told
+@with_error_messages
 async def plan_picture(ctx: Ctx, session: str, plan_id: str) -> bytes:
     """A plan's robots, drawn on the picture."""
-    return await asyncio.to_thread(view, await theirs(ctx, session), plan_id)
+    return await asyncio.to_thread(view, await own_session(ctx, session), plan_id)
 
 
-@told
+@with_error_messages
 async def trace(ctx: Ctx, session: str) -> str:
     """All that happened, an event a line."""
-    await theirs(ctx, session)
+    await own_session(ctx, session)
     events = await asyncio.to_thread(caller(ctx)[0].service.events, session)
     rows = ({"number": e.number, "kind": e.kind, "data": dict(e.data)} for e in events)
     return "\n".join(map(json.dumps, rows))
@@ -56,7 +56,7 @@ def formation(image: str, wish: str, robots: str = "as many as it takes") -> str
 
 
 def add_resources(server: MCPServer[Access]) -> None:
-    """Offer them."""
+    """Register the resources and the prompt with the server."""
     server.resource(f"{ROOT}/scene", mime_type=JPEG)(scene)
     server.resource(f"{ROOT}/plans/{{plan_id}}", mime_type=JSON)(plan)
     server.resource(f"{ROOT}/plans/{{plan_id}}/certificate", mime_type=JSON)(certificate)

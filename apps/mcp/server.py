@@ -1,4 +1,4 @@
-"""The MCP server, and its endpoint over HTTP behind the same guard as all other routes."""
+"""The MCP server, and its HTTP endpoint behind the same guard as all other routes."""
 
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -30,10 +30,10 @@ INSTRUCTIONS = (
 
 
 def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
-    """A server for MCP.
+    """Return an MCP server with the tools and resources.
 
     Args:
-        folders: whose pictures may be opened by their paths.
+        folders: the folders whose pictures may be opened by path.
     """
     access = Access(hub, tuple(folders))
 
@@ -54,10 +54,10 @@ def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
 
 
 class Endpoint:
-    """An ASGI application for one path, behind the guard, which has found who calls.
+    """An ASGI application for one path, behind the guard, which has identified the caller.
 
     Attributes:
-        server: what it serves.
+        server: the MCP server that it serves.
     """
 
     def __init__(self, hub: Hub) -> None:
@@ -70,18 +70,18 @@ class Endpoint:
         self._app = AuthContextMiddleware(self._manager.handle_request)
 
     def running(self) -> AbstractAsyncContextManager[None]:
-        """While it can be called; once."""
+        """Return the context in which it can be called; it can be entered only once."""
         return self._manager.run()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request; a session and a question belong to the token they began with."""
+        """Answer a request; MCP sessions and questions belong to the token they began with."""
         person: Person = scope["state"]["person"]
         token = AccessToken(token="", client_id=person.name, scopes=[person.scope])
         await self._app({**scope, "user": AuthenticatedUser(token)}, receive, send)
 
 
 def mount(app: Starlette, hub: Hub) -> None:
-    """Serve MCP at /mcp of an application, for as long as that runs."""
+    """Serve MCP at /mcp of an application for as long as it runs."""
     endpoint, before = Endpoint(hub), app.router.lifespan_context
 
     @asynccontextmanager

@@ -1,4 +1,4 @@
-"""What tools answer with: a session as it stands, short; positions and pictures on demand."""
+"""The answers of the tools: a session's state in brief; positions and pictures on demand."""
 
 import asyncio
 from typing import Annotated, Any, Literal
@@ -13,14 +13,14 @@ from ...agent.turns import Turn
 from ...tools.draw import draw_view
 from ...tools.errors import InputError
 from ...tools.world import World
-from .access import Ctx, caller, theirs
+from .access import Ctx, caller, own_session
 
 HEARTBEAT = 5.0
-"""Seconds between signs of life while a turn goes on."""
+"""Seconds between progress reports while a turn goes on."""
 PATIENCE = 18.0
 """Seconds after which a call answers that its turn goes on; many clients give up after 60."""
 DETAIL = {"contract", "positions", "headings_deg", "robots", "targets", "verdict", "arrival"}
-"""Fields of a report that are told on demand."""
+"""Fields of a report that are sent on demand."""
 JPEG = "image/jpeg"
 
 
@@ -43,17 +43,17 @@ class State(BaseModel):
     detail: dict[str, Any] | None = None
 
 
-Told = Annotated[CallToolResult, State]
+StateResult = Annotated[CallToolResult, State]
 
 
-async def followed(ctx: Ctx, turn: Turn) -> str:
-    """Wait for the end of a turn, for `PATIENCE` at most, with signs of life meanwhile.
+async def await_turn(ctx: Ctx, turn: Turn) -> str:
+    """Wait for the end of a turn, `PATIENCE` seconds at most, reporting progress meanwhile.
 
     Returns:
-        What is told before its message, where it was done before.
+        Text to put before the state's message if the turn repeats an earlier one; else "".
 
     Raises:
-        InputError: it could not begin.
+        InputError: the turn could not begin.
     """
     beats, left = 0, PATIENCE
     while left > 0:
@@ -73,23 +73,23 @@ async def followed(ctx: Ctx, turn: Turn) -> str:
     return ""
 
 
-async def after(
+async def state_after(
     ctx: Ctx, session: str, turn: Turn, *, detail: bool = False, picture: bool = False
 ) -> CallToolResult:
-    """A session after a turn, or while it goes on."""
-    before = await followed(ctx, turn)
-    return await standing(ctx, session, before, detail=detail, picture=picture)
+    """Wait for a turn, then return the session's state, even if the turn still goes on."""
+    before = await await_turn(ctx, turn)
+    return await session_state(ctx, session, before, detail=detail, picture=picture)
 
 
-async def standing(
+async def session_state(
     ctx: Ctx, session: str, before: str = "", *, detail: bool = False, picture: bool = False
 ) -> CallToolResult:
-    """A session as it stands.
+    """Return the session's current state.
 
     Args:
-        before: what is told before its message.
+        before: text to put before its message.
     """
-    service, held = caller(ctx)[0].service, await theirs(ctx, session)
+    service, held = caller(ctx)[0].service, await own_session(ctx, session)
     now = service.turn(session)
     if now is not None or await asyncio.to_thread(service.is_written, session):
         driving = now is not None and now.moving.is_set()
@@ -130,13 +130,13 @@ def _reported(session: str, report: Report, *, detail: bool) -> State:
 
 
 def view(held: Session, plan_id: str | None = None) -> bytes:
-    """The picture with rulers, as JPEG: with a plan's robots, or with what a question offers.
+    """Return the picture with rulers, as JPEG, and a plan's robots or a question's choices on it.
 
     Raises:
         InputError: there is no such plan.
     """
     run = held.run
-    plan = None if plan_id is None else planned(held, plan_id).plan
+    plan = None if plan_id is None else plan_node(held, plan_id).plan
     if run is None:
         return draw_view(held.picture, World.of(held.picture))
     if plan is not None:
@@ -145,11 +145,11 @@ def view(held: Session, plan_id: str | None = None) -> bytes:
     return shown or draw_view(run.context.picture, run.world.having(targets=()))
 
 
-def planned(held: Session, plan_id: str) -> Any:
-    """A plan of a session, with what it was made from.
+def plan_node(held: Session, plan_id: str) -> Any:
+    """Return a plan of a session as a node, with the plan that it was made from.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such plan (`missing`).
     """
     plans = {} if held.run is None else held.run.world.plans
     if plan_id not in plans:

@@ -1,8 +1,8 @@
-"""The tools that a client sees: few, each one thing a person wants of the whole team.
+"""The tools of the MCP server: few, each one thing that a person wants of the whole team.
 
-No argument of any of them is a person's yes: words plan and never move robots here, and real ones
-are driven only after a person was asked, through the client where it can ask. The nonce which that
-yes has to name never leaves the server.
+No tool takes a person's approval as an argument: words plan here and never move robots, and real
+ones drive only after a person was asked, through the client if it can ask. The nonce that an
+approval must name never leaves the server.
 """
 
 import asyncio
@@ -24,10 +24,10 @@ from ...tools.context import Context as ToolContext
 from ...tools.errors import InputError
 from ...tools.formation.editing.edit_kinds import EDIT_SCHEMA
 from ..server.forms import Key, Pointed, Words
-from ..server.hub import asked_by, need
+from ..server.hub import asked_by, require_scope
 from ..server.sessions import check_room
-from .access import Access, Ctx, caller, permitted, picture_named, told
-from .state import Told, after, followed, planned, standing
+from .access import Access, Ctx, authorize, caller, picture_named, with_error_messages
+from .state import StateResult, await_turn, plan_node, session_state, state_after
 
 NO_GO = (
     "Nothing was done: words move no robots here. Say it without the go, and have the certified "
@@ -47,7 +47,7 @@ Edits = Annotated[
 ]
 
 
-@told
+@with_error_messages
 async def open_scene(
     ctx: Ctx,
     image: Annotated[str, Field(description="path of a file, or over HTTP an id; or a data URL")],
@@ -56,10 +56,10 @@ async def open_scene(
     robot_radius: Annotated[float | None, Field(ge=0, le=1e5, description="px")] = None,
     clearance: Annotated[float | None, Field(ge=0, le=1e5, description="px")] = None,
     picture: Shown = False,
-) -> Told:
+) -> StateResult:
     """Begin a session about a picture taken from above; everything else needs its id."""
     hub, person = caller(ctx)
-    need(person, "plan")
+    require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     seen = await picture_named(ctx, image)
     settings = hub.settings.of_session(
@@ -68,12 +68,12 @@ async def open_scene(
         robot_radius=robot_radius,
         clearance=clearance,
     )
-    ToolContext.of(seen, settings)  # what cannot be is said before anything is kept
+    ToolContext.of(seen, settings)  # raises before anything is stored
     made = hub.service.open(seen, settings=settings, owner=person.name)
-    return await standing(ctx, made, picture=picture)
+    return await session_state(ctx, made, picture=picture)
 
 
-@told
+@with_error_messages
 async def instruct(
     ctx: Ctx,
     session: ASession,
@@ -82,24 +82,24 @@ async def instruct(
     idempotency_key: AKey | None = None,
     detail: Detail = False,
     picture: Shown = False,
-) -> Told:
+) -> StateResult:
     """Say in the person's own words what the team shall do or change; also questions and answers.
 
     It plans and certifies; no robot moves. "Surround the coin with 6 robots", "a bit further out",
     "undo", "how far is robot 4?".
     """
-    service, person = await permitted(ctx, session, "plan")
+    service, person = await authorize(ctx, session, "plan")
     asked = Asked(by=person.name, key=idempotency_key, may_move=False)
     turn = service.say(session, words, asked, pointed=points)
     try:
-        return await after(ctx, session, turn, detail=detail, picture=picture)
+        return await state_after(ctx, session, turn, detail=detail, picture=picture)
     except InputError as error:
         if error.kind != "not_allowed":
             raise
         raise InputError(NO_GO) from None
 
 
-@told
+@with_error_messages
 async def edit(
     ctx: Ctx,
     session: ASession,
@@ -107,28 +107,28 @@ async def edit(
     idempotency_key: AKey | None = None,
     detail: Detail = False,
     picture: Shown = False,
-) -> Told:
+) -> StateResult:
     """Change the plan that stands exactly, without words; what is not named stays as it is."""
-    service, person = await permitted(ctx, session, "plan")
+    service, person = await authorize(ctx, session, "plan")
     asked = Asked(by=person.name, key=idempotency_key, may_move=False)
     turn = service.edit(session, *edits, asked=asked)
-    return await after(ctx, session, turn, detail=detail, picture=picture)
+    return await state_after(ctx, session, turn, detail=detail, picture=picture)
 
 
-@told
+@with_error_messages
 async def status(
     ctx: Ctx,
     session: ASession,
     wait: Annotated[bool, Field(description="for some seconds, for the end of what runs")] = False,
     detail: Detail = False,
     picture: Shown = False,
-) -> Told:
+) -> StateResult:
     """How a session stands: its plan, what waits for a person, whether robots drive or arrived."""
-    service, _ = await permitted(ctx, session)
+    service, _ = await authorize(ctx, session)
     turn = service.turn(session)
     if wait and turn is not None:
-        return await after(ctx, session, turn, detail=detail, picture=picture)
-    return await standing(ctx, session, detail=detail, picture=picture)
+        return await state_after(ctx, session, turn, detail=detail, picture=picture)
+    return await session_state(ctx, session, detail=detail, picture=picture)
 
 
 class Yes(BaseModel):
@@ -138,27 +138,27 @@ class Yes(BaseModel):
 
 
 def _key_of_yes(idempotency_key: str) -> str:
-    """The key of the turn that follows a person's answer to a call."""
+    """Return the idempotency key of the turn that follows a person's answer to a call."""
     return f"{idempotency_key}/answer"
 
 
-@told
+@with_error_messages
 async def ask_person(
     ctx: Ctx, session: str, plan_id: str, idempotency_key: str
 ) -> Elicit[Yes] | str:
-    """Begin to drive; where a person has to say yes first, ask them.
+    """Begin to drive; if a person has to approve it first, ask them.
 
     Returns:
-        The question, or what is told before how the session stands, where nobody is asked.
+        The question, or, if nobody is asked, text to put before the message of the session's state.
     """
-    service, person = await permitted(ctx, session, "move")
-    planned(service.session(session), plan_id)
+    service, person = await authorize(ctx, session, "move")
+    plan_node(service.session(session), plan_id)
     now = service.turn(session)
     if now is not None and now.asked.key == _key_of_yes(idempotency_key):
-        return await followed(ctx, now)
+        return await await_turn(ctx, now)
     waits = None if now is not None else await service.waits(session)
     if waits is None or waits.plan_id != plan_id:
-        before = await followed(
+        before = await await_turn(
             ctx, service.go(session, plan_id, asked=asked_by(person, idempotency_key))
         )
         waits = None if before else await service.waits(session)
@@ -171,49 +171,49 @@ async def ask_person(
 
 
 def _can_ask(ctx: Ctx) -> bool:
-    """Whether the client shows forms to a person; one that names no kind shows forms."""
+    """Return whether the client shows forms to a person; one that names no kind shows forms."""
     declared = ctx.client_capabilities
     offers = None if declared is None else declared.elicitation
     return offers is not None and (offers.form is not None or offers.url is None)
 
 
-@told
+@with_error_messages
 async def approve_and_deploy(
     ctx: Ctx,
     session: ASession,
     plan_id: Annotated[str, Field(min_length=1, max_length=100)],
     idempotency_key: AKey,
     answer: Annotated[Answer, Resolve(ask_person)],
-) -> Told:
+) -> StateResult:
     """Drive the robots to a certified plan. Real ones only after a person said yes, who is asked.
 
     Robots that still drive after some seconds: status "running", then ask status.
     """
     said = answer.data if isinstance(answer, AcceptedElicitation) else None
     if isinstance(said, str):
-        return await standing(ctx, session, said)
-    service, person = await permitted(ctx, session, "move")
+        return await session_state(ctx, session, said)
+    service, person = await authorize(ctx, session, "move")
     waits = await service.waits(session)
     if waits is None or waits.plan_id != plan_id or isinstance(answer, CancelledElicitation):
-        return await standing(ctx, session)
+        return await session_state(ctx, session)
     asked = asked_by(person, _key_of_yes(idempotency_key))
     if isinstance(said, Yes) and said.approve:
         turn = service.approve(session, plan_id, waits.nonce, asked=asked)
     else:
         turn = service.say(session, "no", asked)
-    return await after(ctx, session, turn)
+    return await state_after(ctx, session, turn)
 
 
-@told
-async def stop(ctx: Ctx, session: ASession) -> Told:
+@with_error_messages
+async def stop(ctx: Ctx, session: ASession) -> StateResult:
     """Hold all robots at once where they are, and end what runs."""
-    service, person = await permitted(ctx, session)
+    service, person = await authorize(ctx, session)
     await service.stop(session, asked_by(person))
-    return await standing(ctx, session)
+    return await session_state(ctx, session)
 
 
 def add_tools(server: MCPServer[Access]) -> None:
-    """Offer them."""
+    """Register the tools with the server."""
     for tool in (open_scene, instruct, edit, stop):
         hints = ToolAnnotations(destructive_hint=False, open_world_hint=False)
         server.add_tool(tool, annotations=hints)

@@ -1,1 +1,1 @@
-"""`formup serve`: the service over HTTP, for pages, chatbots, programs and MCP clients."""
+"""`formup serve`: serves the team over HTTP to pages, chatbots, programs and MCP clients."""

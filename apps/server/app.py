@@ -1,4 +1,4 @@
-"""The application of a server: routes, who may use them, and how it begins and ends."""
+"""The application of a server: its routes, guard, error handlers and lifespan."""
 
 from collections.abc import AsyncGenerator
 from contextlib import asynccontextmanager
@@ -13,7 +13,7 @@ from ...agent.service import Service
 from ...tools.errors import FormupError
 from . import health, openai_chat, openai_responses, page, scenes, sessions, sharing, streams, turns
 from .guard import Guard
-from .hub import Hub, error_response, told
+from .hub import Hub, error_response, formup_error_response
 from .metrics import Metrics
 from .settings import ServerSettings
 from .tokens import Tokens
@@ -25,10 +25,10 @@ PARTS = (
 
 
 def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> FastAPI:
-    """The application of a server.
+    """Return the application of a server.
 
     Args:
-        service: which it closes at its end.
+        service: closed when the application ends.
     """
     hub = Hub(service, settings, tokens, Metrics())
     service.ended = hub.metrics.turn_ended
@@ -43,7 +43,7 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
         version=version("formup"),
         summary="Talk to a team of robots over HTTP.",
         lifespan=lifespan,
-        docs_url=None,  # its page fetches scripts from elsewhere
+        docs_url=None,  # its page fetches scripts from other sites
         redoc_url=None,
     )
     app.state.hub = hub
@@ -72,11 +72,11 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
 
 async def _formup_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, FormupError)
-    return told(error)
+    return formup_error_response(error)
 
 
 async def _invalid_request(request: Request, error: Exception) -> Response:
-    """All violations at once; values are left out, for they may be long."""
+    """Report all violations at once, without the values, which may be long."""
     assert isinstance(error, RequestValidationError)
     parts = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
     return error_response(422, f"{'; '.join(parts)}.", "invalid")

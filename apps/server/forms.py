@@ -16,7 +16,7 @@ Pointed = Annotated[tuple[TargetPrompt, ...], Field(max_length=100)]
 
 
 class Form(BaseModel):
-    """JSON from a client; fields that there are not are refused."""
+    """JSON from a client; unknown fields are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -89,7 +89,7 @@ class Waits(BaseModel):
 
     @classmethod
     def of(cls, waiting: Waiting | None) -> "Waits | None":
-        """As the service has it."""
+        """Return the form of what the service says is waiting; None if nothing is."""
         if waiting is None:
             return None
         return cls(plan_id=waiting.plan_id, nonce=waiting.nonce, message=waiting.message)
@@ -114,7 +114,7 @@ class TurnState(BaseModel):
 
     @classmethod
     def of(cls, run: Run, number: int, by: str = "") -> "TurnState":
-        """A turn that is over."""
+        """Return the state of a turn that is over."""
         report = run.report
         return cls(
             turn=number,

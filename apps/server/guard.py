@@ -1,4 +1,4 @@
-"""What stands before every route: who asks, from where, how much, how often, how slowly."""
+"""The guard before every route: checks who asks, from where, how much, how often, how slowly."""
 
 import asyncio
 import time
@@ -11,25 +11,25 @@ from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from ...tools.errors import FormupError, InputError
-from .hub import Hub, error_response, told
+from .hub import Hub, error_response, formup_error_response
 from .tokens import Person
 
 OPEN = ("/health/", "/v1/pictures/", "/page/")
-"""Paths that want no token: what they show is no secret, or has one of its own in its address."""
+"""Paths open without a token: they show nothing secret, or have a secret in the address."""
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 STALLED = 60.0
-"""Seconds after which a client that takes nothing of a response is cut off."""
+"""Seconds after which a client that stops reading a response is cut off."""
 
 KNOWN = 2.0
-"""Seconds between looks whether the token of a request that goes on still stands."""
+"""Seconds between checks that the token of a long request is still valid."""
 
 
 class Guard:
-    """An ASGI middleware.
+    """An ASGI middleware that refuses requests before any route sees them.
 
     Args:
-        hub: of the server; its tokens, settings and counts are used.
+        hub: the server's; supplies tokens, settings and counts.
     """
 
     def __init__(self, app: ASGIApp, hub: Hub) -> None:
@@ -47,15 +47,15 @@ class Guard:
         async def watched(message: Message) -> None:
             nonlocal begun
             if refused and not begun:
-                return  # told below, whatever is made of it
+                return  # the refusal is sent below in place of this response
             begun = True
             self._hub.metrics.answered(message.get("status", 0))
             async with asyncio.timeout(STALLED):
                 await send(message)
 
         try:
-            self._check_place(scope["method"], headers)
-            async with self._known(scope["method"], scope["path"], headers) as person:
+            self._check_origin(scope["method"], headers)
+            async with self._authenticated(scope["method"], scope["path"], headers) as person:
                 scope.setdefault("state", {})["person"] = person
                 counts = nullcontext() if _is_open(scope["path"]) else self._counted(person)
                 with counts:
@@ -66,7 +66,7 @@ class Guard:
             if begun:
                 raise
             refused.clear()
-            await told(error)(scope, receive, watched)
+            await formup_error_response(error)(scope, receive, watched)
         except _RefusedError as error:
             refused.clear()
             if begun:
@@ -78,8 +78,10 @@ class Guard:
             await response(scope, receive, watched)
 
     @asynccontextmanager
-    async def _known(self, method: str, path: str, headers: Headers) -> AsyncGenerator[Person]:
-        """Who asks; what they asked for ends with their token."""
+    async def _authenticated(
+        self, method: str, path: str, headers: Headers
+    ) -> AsyncGenerator[Person]:
+        """Yield who asks, and end their request if their token is revoked meanwhile."""
         loop, person = asyncio.get_running_loop(), self._person(path, headers)
         there = f"/api/sessions/{person.sees}"
         inside = path == there or path.startswith(f"{there}/")
@@ -105,8 +107,8 @@ class Guard:
         finally:
             looks.cancel()
 
-    def _check_place(self, method: str, headers: Headers) -> None:
-        """Refuse names of this server that others gave it, and pages of other origins."""
+    def _check_origin(self, method: str, headers: Headers) -> None:
+        """Refuse hosts that are not names of this server, and unsafe calls of other origins."""
         host, settings = headers.get("host", ""), self._hub.settings
         name = _parsed_address(f"//{host}").hostname or ""
         mine = LOOPBACK | {settings.host} | set(_parts(settings.hosts))
@@ -139,7 +141,7 @@ class Guard:
 
     @contextmanager
     def _counted(self, person: Person) -> Generator[None]:
-        """Refuse more requests than one may make at a time, or in a minute."""
+        """Count a request, or refuse it beyond those a person may make at a time or in a minute."""
         settings, name, now = self._hub.settings, person.name, time.monotonic()
         recent, running = self._recent[name], self._hub.running
         while recent and recent[0] < now - 60:
@@ -158,7 +160,14 @@ class Guard:
             running[name] -= 1
 
     def _bounded(self, receive: Receive, headers: Headers, refused: list[Exception]) -> Receive:
-        """What a request sends, up to a size and within a time; else what it is refused for."""
+        """Wrap `receive` with limits of size and time.
+
+        Args:
+            refused: gets the error that a request is refused for.
+
+        Raises:
+            InputError: the declared size is too large (`too_large`).
+        """
         most, seconds = self._hub.settings.upload_bytes, self._hub.settings.body_seconds
         large = InputError(
             f"The request is larger than the {most:,} bytes that are allowed.", "too_large"
@@ -202,7 +211,7 @@ def _is_open(path: str) -> bool:
 
 
 def _parsed_address(text: str) -> SplitResult:
-    """An address; an empty one where it is none."""
+    """Split an address into its parts; they are empty if it is not valid."""
     try:
         return urlsplit(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Whether a server lives, is ready for more, and its figures for Prometheus."""
+"""Health checks of a server, live and ready, and its metrics for Prometheus."""
 
 import asyncio
 

@@ -1,4 +1,4 @@
-"""What all routes of a server share: the service, who asks, and how errors are told."""
+"""What all routes of a server share: the service, who asks, and error responses."""
 
 import logging
 from collections import Counter
@@ -29,17 +29,17 @@ STATUS: Mapping[Kind | None, int] = {
     "too_large": 413,
     "too_many": 429,
 }
-"""HTTP statuses by the kind of an error; 422 for any other that a person causes."""
+"""HTTP status by the kind of an error; any other that a person causes is 422."""
 
 
 @dataclass
 class Hub:
-    """What a server works with.
+    """The shared state of a server.
 
     Attributes:
-        running: how many requests of a person are under way.
-        streams: how many event streams are open.
-        leaving: whether it is about to end; it is not ready for more then.
+        running: number of requests under way, by the name of the person.
+        streams: number of open event streams.
+        leaving: whether the server is about to end, and so not ready for more.
     """
 
     service: Service
@@ -52,12 +52,12 @@ class Hub:
 
 
 def hub_of(request: Request) -> Hub:
-    """The hub of the server that a request came to."""
+    """Return the hub of the server that a request came to."""
     return request.app.state.hub
 
 
 def person_of(request: Request) -> Person:
-    """Who a request comes from, as the guard found."""
+    """Return who a request comes from, as the guard found."""
     return request.state.person
 
 
@@ -65,11 +65,11 @@ AHub = Annotated[Hub, Depends(hub_of)]
 APerson = Annotated[Person, Depends(person_of)]
 
 
-def need(person: Person, scope: Scope) -> None:
-    """Refuse who may not do something.
+def require_scope(person: Person, scope: Scope) -> None:
+    """Refuse a person who does not have a scope.
 
     Raises:
-        InputError: saying so (`not_allowed`).
+        InputError: they do not have it (`not_allowed`).
     """
     if not person.may(scope):
         raise InputError(
@@ -79,13 +79,14 @@ def need(person: Person, scope: Scope) -> None:
 
 
 def check_owner(session: str, person: Person, by: str | None = None) -> str:
-    """The id of a session of theirs; others are as if they were not there.
+    """Return the session's id if it is the person's own; the sessions of others count as missing.
 
     Args:
-        by: who asked for the turn that is looked at: those who approve see what came of it.
+        by: who asked for the turn in question; a person who may approve also sees turns that
+            they asked for in the sessions of others.
 
     Raises:
-        InputError: it is not theirs (`missing`).
+        InputError: the session is not theirs (`missing`).
     """
     approved = person.may("approve") and by == person.name
     if owner_of(session) != person.name and not approved:
@@ -94,7 +95,7 @@ def check_owner(session: str, person: Person, by: str | None = None) -> str:
 
 
 async def check_seen(hub: Hub, session: str, person: Person) -> str:
-    """The id of a session of theirs, or for those who approve of one in which something waits.
+    """Return the session's id if it is theirs, or if they may approve what waits in it.
 
     Raises:
         InputError: it is neither (`missing`).
@@ -105,29 +106,29 @@ async def check_seen(hub: Hub, session: str, person: Person) -> str:
 
 
 def asked_by(person: Person, key: str | None = None) -> Asked:
-    """Who asks for a turn, to the service."""
+    """Return who asks for a turn, in the service's terms."""
     return Asked(by=person.name, key=key, may_move=person.may("move"))
 
 
 def error_data(message: str, code: str | None, type: str = "invalid_request_error") -> Any:
-    """An error as OpenAI's API has it, which all routes keep to."""
+    """Return an error in the format of OpenAI's API, which all routes use."""
     return {"error": {"message": message, "type": type, "param": None, "code": code}}
 
 
 def error_response(status: int, message: str, code: str | None = None) -> JSONResponse:
-    """An error, as a response."""
+    """Return an error as a response."""
     kind = "invalid_request_error" if status < 500 else "server_error"
     return JSONResponse(error_data(message, code, kind), status)
 
 
-def told(error: FormupError) -> JSONResponse:
-    """An error that formup raised on purpose, as a response."""
+def formup_error_response(error: FormupError) -> JSONResponse:
+    """Return the response to a `FormupError`; from status 500 on, it only points to the log."""
     by_kind = STATUS.get(error.kind)
     usual = (
         500 if isinstance(error, StorageError) else 422 if isinstance(error, InputError) else 502
     )
     status = by_kind or usual
-    if status >= 500:  # names addresses of the store, of models' and robots' hosts
+    if status >= 500:  # may name addresses of the store, models and robots
         LOG.error("failed", extra={"facts": {"error": str(error)}})
         return error_response(status, "The server cannot do that now; its log says why.")
     return error_response(status, str(error), error.kind)

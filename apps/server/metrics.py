@@ -1,4 +1,4 @@
-"""What a server counts, for Prometheus; no words, no names of people."""
+"""The metrics of a server, for Prometheus; they contain no words and no names of people."""
 
 import asyncio
 import logging
@@ -19,15 +19,15 @@ class Metrics:
     """Counts and times of a server.
 
     Attributes:
-        turns: by what came of them.
-        seconds: of a turn, from its words to its end.
-        streams: event streams now.
-        refused: requests that were refused, by HTTP status.
+        turns: number of turns, by their status.
+        seconds: duration of a turn, from its words to its end.
+        streams: number of open event streams.
+        refused: number of requests refused, by HTTP status.
     """
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
-        ProcessCollector(registry=self.registry)  # CPU and memory, where the system tells them
+        ProcessCollector(registry=self.registry)  # CPU and memory, where the system has them
         here, by = self.registry, ["status"]
         self.turns = Counter("formup_turns", "Turns by what came of them.", by, registry=here)
         self.seconds = Histogram(
@@ -37,7 +37,7 @@ class Metrics:
         self.refused = Counter("formup_requests_refused", "By HTTP status.", by, registry=here)
 
     def answered(self, status: int) -> None:
-        """Count what was refused; 0 where no response begins."""
+        """Count a response if it refuses a request; status 0 is a later part of a response."""
         if status >= 400:
             self.refused.labels(status).inc()
 

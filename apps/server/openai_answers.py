@@ -1,6 +1,6 @@
-"""What a chat client is answered: a turn is begun, awaited, and told in Markdown with its picture.
+"""The answers to chat clients: a turn is begun, awaited, and reported in Markdown with a picture.
 
-A turn goes on when its client has gone, and the same request sent again finds it.
+A turn goes on if its client disconnects, and the same request sent again finds it.
 """
 
 import asyncio
@@ -24,17 +24,17 @@ from ...tools.draw import draw_plan
 from ...tools.errors import FormupError, InputError
 from ..run_display import choice_words
 from ..run_files import draw_choices
-from .hub import Hub, asked_by, check_owner, need
+from .hub import Hub, asked_by, check_owner, require_scope
 from .openai_chores import chore
-from .openai_places import PICTURE, alone, begun_before, find, name_of, run_at
-from .openai_request import Message, Place, Said, digest
+from .openai_places import PICTURE, find_session, name_of, person_lock, recently_opened, run_at
+from .openai_request import ChatRequest, Message, Place, digest
 from .sessions import check_room, checked_picture
 from .tokens import Person
 
 USUAL = "formup"
-"""What the usual agent is called."""
+"""The model name of the default agent."""
 BEAT, DRIVING = 5.0, 20.0
-"""Seconds between signs of life, and for which robots that drive are waited for."""
+"""Seconds between heartbeats, and the longest wait, in seconds, for robots that are driving."""
 NEEDED = (
     "I need a picture of the place, and what the robots should do there: attach one picture, and "
     "say for example *Surround the largest coin with 6 robots*."
@@ -53,29 +53,29 @@ NOTHING_MOVES = (
 )
 DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
-"""What would make a link, a picture or HTML of words that a model may have read in a picture."""
+"""Characters to escape, so that text a model read in a picture is no link, picture or HTML."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a client is told.
+    """An answer to a client.
 
     Attributes:
-        place: the turn that it came of; None for none.
+        place: the turn that it is about; None for none.
     """
 
     text: str
     place: Place | None = None
     usage: Totals = field(default_factory=Totals)
 
-    async def told(self) -> AsyncGenerator["Answer"]:
-        """Itself, at once."""
+    async def answers(self) -> AsyncGenerator["Answer"]:
+        """Yield this answer."""
         yield self
 
 
 @dataclass(frozen=True)
 class Begun:
-    """A turn on its way."""
+    """A turn that has begun, to be answered when it ends."""
 
     base: str
     session: str
@@ -83,36 +83,38 @@ class Begun:
 
     @property
     def place(self) -> Place:
-        """Where it is."""
+        """The session and number of the turn."""
         return Place(self.session, self.turn.number)
 
-    async def told(self) -> AsyncGenerator[Answer | None]:
-        """What came of it, or that robots drive for long; before that None, as signs of life.
+    async def answers(self) -> AsyncGenerator[Answer | None]:
+        """Yield None as a heartbeat until the turn ends, then its answer.
+
+        Once robots have driven for `DRIVING` seconds, the answer is a note that they still do.
 
         Raises:
-            FormupError: it came to nothing.
+            FormupError: the turn failed.
         """
         moves = None
         while not self.turn.task.done():
             if self.turn.moving.is_set():
                 moves = moves or time.monotonic()
                 if time.monotonic() - moves >= DRIVING:
-                    yield _at_once(ON_THE_WAY, self.base, self.place)
+                    yield _text_answer(ON_THE_WAY, self.base, self.place)
                     return
             yield None
             await asyncio.wait({self.turn.task}, timeout=BEAT)
         run = await self.turn.ended()
-        yield Answer(CUT_OFF) if run is None else await told(self.place, run, self.base)
+        yield Answer(CUT_OFF) if run is None else await answer_of(self.place, run, self.base)
 
 
-async def awaited(begun: Answer | Begun) -> Answer:
-    """What there is to tell, once it is there."""
-    answers = [answer async for answer in begun.told() if answer is not None]
+async def final_answer(begun: Answer | Begun) -> Answer:
+    """Wait for the answer and return it."""
+    answers = [answer async for answer in begun.answers() if answer is not None]
     return answers[-1]
 
 
 def problem(error: Exception) -> str:
-    """What a client is told of an error; only the log has what is our own."""
+    """Return what a client is told of an error; internal errors go to the log alone."""
     if isinstance(error, FormupError):
         return str(error)
     logging.getLogger("formup").error("a turn broke", exc_info=error)
@@ -120,77 +122,79 @@ def problem(error: Exception) -> str:
 
 
 def base_of(request: Request, hub: Hub) -> str:
-    """The address of this server, as browsers reach it."""
+    """Return the address of this server, as browsers reach it."""
     return (hub.settings.public_url or str(request.base_url)).rstrip("/")
 
 
 def agents(hub: Hub) -> dict[str, str]:
-    """Names of agents by what clients call them; the usual one first."""
+    """Return the agents' names by the model names that clients use, the default one first."""
     usual, *others = hub.service.agents
     return {USUAL: usual, **{name: name for name in others}}
 
 
-async def begin(hub: Hub, person: Person, said: Said, base: str) -> Answer | Begun:
-    """Do what a request says, as far as its beginning.
+async def begin(hub: Hub, person: Person, request: ChatRequest, base: str) -> Answer | Begun:
+    """Begin the turn that a request asks for, or answer it at once if it needs none.
 
     Args:
         base: the address of this server.
 
     Raises:
-        InputError: it cannot be done.
+        InputError: the request cannot be carried out.
     """
-    if said.model not in agents(hub):
+    if request.model not in agents(hub):
         there = ", ".join(agents(hub))
         raise InputError(
-            f"There is no model {said.model[:80]!r} here; there is {there}.", "missing"
+            f"There is no model {request.model[:80]!r} here; there is {there}.", "missing"
         )
-    if (answer := chore(said)) is not None:
+    if (answer := chore(request)) is not None:
         return Answer(answer)
-    if said.place is not None and not said.since:  # nothing has been said since our answer
-        check_owner(said.place.session, person)
-        return await told(said.place, await run_at(hub, said.place), base)
-    _check(said.last)
-    if (held := await _hold(hub, person, said, base)) is not None:
+    if request.place is not None and not request.since:  # no new message since our answer
+        check_owner(request.place.session, person)
+        return await answer_of(request.place, await run_at(hub, request.place), base)
+    _check(request.last)
+    if (held := await _hold(hub, person, request, base)) is not None:
         return held
-    need(person, "plan")
-    async with alone(hub, person):
-        there = await find(hub, person, said)
-        found = there or await _open_session(hub, person, said)
+    require_scope(person, "plan")
+    async with person_lock(hub, person):
+        there = await find_session(hub, person, request)
+        found = there or await _open_session(hub, person, request)
     if found is None:
         return Answer(NEEDED)
     session, key = found
     try:
-        turn = await _turn(hub, person, said, session, key)
+        turn = await _turn(hub, person, request, session, key)
         if turn is None:
-            return _at_once(EMPTY, base, said.place)
+            return _text_answer(EMPTY, base, request.place)
         await turn.begin()
         return Begun(base, session, turn)
     except InputError as error:
         if there is None and error.kind not in ("repeated", "busy"):
             await hub.service.delete(session)
-        return await _instead(hub, session, said, base, error)
+        return await _fallback_answer(hub, session, request, base, error)
 
 
-async def _instead(hub: Hub, session: str, said: Said, base: str, error: InputError) -> Answer:
-    """What is told where a turn does not begin.
+async def _fallback_answer(
+    hub: Hub, session: str, request: ChatRequest, base: str, error: InputError
+) -> Answer:
+    """Return the answer where a turn could not begin: repeated, not allowed, or busy.
 
     Raises:
-        InputError: that one, where it is no answer.
+        InputError: the error itself, if it is none of these.
     """
     if error.kind == "repeated":
         place = Place(session, error.facts["turn"])
-        return await told(place, await run_at(hub, place), base)
+        return await answer_of(place, await run_at(hub, place), base)
     if error.kind == "not_allowed":
-        return _at_once(str(error), base, said.place)
+        return _text_answer(str(error), base, request.place)
     if error.kind != "busy":
         raise error
     now = hub.service.turn(session)
-    place = Place(session, now.number) if now and now.number else said.place
-    return _at_once(DRIVES if now and now.moving.is_set() else BUSY, base, place)
+    place = Place(session, now.number) if now and now.number else request.place
+    return _text_answer(DRIVES if now and now.moving.is_set() else BUSY, base, place)
 
 
-async def told(place: Place, run: Run, base: str) -> Answer:
-    """What came of a turn, with its picture, which lies in its session."""
+async def answer_of(place: Place, run: Run, base: str) -> Answer:
+    """Return the answer to a finished turn, and store its picture in the session."""
     report, choices = run.report, run.report.candidates or ()
     message = BROKEN_OFF if isinstance(run.outcome, Cancelled) else report.message
     lines = [message]
@@ -203,23 +207,25 @@ async def told(place: Place, run: Run, base: str) -> Answer:
     text = UNSAFE.sub(r"\\\g<0>", "\n\n".join(lines))
     png = await asyncio.to_thread(_picture, run)
     if png is None or run.stored is None:
-        return _at_once(text, base, place, report.usage)
+        return _text_answer(text, base, place, report.usage)
     sha256 = await asyncio.to_thread(run.stored.artefacts.put, png)
     shows = "The choices" if choices else f"Plan {report.plan_id}"
     text += f"\n\n![{shows}]({base}{place.path}/{sha256}.png)"
     return Answer(text, place, report.usage)
 
 
-async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | None) -> Turn | None:
-    """The turn that a request begins; None where it says nothing new.
+async def _turn(
+    hub: Hub, person: Person, request: ChatRequest, session: str, key: str | None
+) -> Turn | None:
+    """Start the turn that a request asks for; return None if it says nothing new.
 
     Raises:
-        InputError: it cannot begin, or was there before.
+        InputError: the turn cannot begin, or repeats an earlier one.
     """
-    held, turn, words = await hub.service.fresh(session), None, said.last.text
-    if held.run is None and not words:  # they came before the picture
-        words = next((m.text for m in reversed(said.users) if m.text), "")
-    for address in said.last.pictures:
+    held, turn, words = await hub.service.fresh(session), None, request.last.text
+    if held.run is None and not words:  # the words came in a message before the picture
+        words = next((m.text for m in reversed(request.users) if m.text), "")
+    for address in request.last.pictures:
         data = _data(address)
         if hashlib.sha256(data).hexdigest() != held.picture.sha256:
             picture = await asyncio.to_thread(checked_picture, data, "picture", hub)
@@ -235,13 +241,17 @@ async def _turn(hub: Hub, person: Person, said: Said, session: str, key: str | N
     return turn
 
 
-async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str] | None:
-    """A new session, or the one that the same message began just now; None without a picture."""
-    pictured = [m for m in said.users if m.pictures]
-    if not pictured or not any(m.text for m in said.users):
+async def _open_session(hub: Hub, person: Person, request: ChatRequest) -> tuple[str, str] | None:
+    """Open a session, unless the same message has just opened one.
+
+    Returns:
+        The session's id and the key of the turn; None if the messages lack a picture or words.
+    """
+    pictured = [m for m in request.users if m.pictures]
+    if not pictured or not any(m.text for m in request.users):
         return None
-    key = digest(said.who, *said.users)
-    if (before := await begun_before(hub, person, key)) is not None:
+    key = digest(request.who, *request.users)
+    if (before := await recently_opened(hub, person, key)) is not None:
         return before, key
     await asyncio.to_thread(check_room, hub, person)
     _check(pictured[-1])
@@ -249,32 +259,36 @@ async def _open_session(hub: Hub, person: Person, said: Said) -> tuple[str, str]
     made = hub.service.open(
         await asyncio.to_thread(checked_picture, data, "picture", hub),
         settings=hub.settings.of_session(),
-        name=name_of(said, key),
-        agent=agents(hub)[said.model],
+        name=name_of(request, key),
+        agent=agents(hub)[request.model],
         owner=person.name,
     )
     return made, key
 
 
-async def _hold(hub: Hub, person: Person, said: Said, base: str) -> Answer | None:
-    """Hold the robots, whoever asks and whatever has happened since; None where nobody does."""
-    if not is_stop(said.last.text, driving=True):
+async def _hold(hub: Hub, person: Person, request: ChatRequest, base: str) -> Answer | None:
+    """Hold the robots if a stop is asked for, whoever asks and whatever has happened since.
+
+    Returns:
+        The answer; None if no stop is asked for.
+    """
+    if not is_stop(request.last.text, driving=True):
         return None
-    found = await find(hub, person, said, here=True)
-    if not is_stop(said.last.text) and not (found and hub.service.turn(found[0])):
+    found = await find_session(hub, person, request, here=True)
+    if not is_stop(request.last.text) and not (found and hub.service.turn(found[0])):
         return None
     await hub.service.hold()
     run = await hub.service.stop(found[0], asked_by(person)) if found else None
     if found is None or run is None:
-        return _at_once(NOTHING_MOVES, base, said.place)
-    return await told(Place(found[0], hub.service.last_turn(found[0])), run, base)
+        return _text_answer(NOTHING_MOVES, base, request.place)
+    return await answer_of(Place(found[0], hub.service.last_turn(found[0])), run, base)
 
 
 def _data(address: str) -> bytes:
-    """What a data URL holds; nothing is ever fetched.
+    """Decode the data URL of a picture; nothing is ever fetched.
 
     Raises:
-        InputError: it is none of a picture.
+        InputError: the address is not a data URL of a picture.
     """
     head = DATA.match(address)
     if head is None:
@@ -290,7 +304,7 @@ def _data(address: str) -> bytes:
 
 
 def _check(message: Message) -> None:
-    """Refuse parts of a message that would be left out without a word."""
+    """Refuse parts of a message that would otherwise be silently ignored."""
     if message.others:
         raise InputError(
             f"A message may hold text and a picture; this one holds {message.others[0][:40]!r}."
@@ -302,7 +316,7 @@ def _check(message: Message) -> None:
 
 
 def _picture(run: Run) -> bytes | None:
-    """What a turn shows: choices, or the plan that it was about."""
+    """Return the picture of a turn as PNG: its choices or its plan; None if it shows neither."""
     report, file = run.report, io.BytesIO()
     node = run.world.plans.get(report.plan_id or "")
     if report.candidates:
@@ -315,7 +329,7 @@ def _picture(run: Run) -> bytes | None:
     return file.getvalue()
 
 
-def _at_once(text: str, base: str, place: Place | None, usage: Totals | None = None) -> Answer:
-    """An answer without a picture: a definition that Markdown does not show has its place."""
+def _text_answer(text: str, base: str, place: Place | None, usage: Totals | None = None) -> Answer:
+    """Return an answer without a picture, its place in a link definition, which Markdown hides."""
     mark = f"\n\n[formup]: {base}{place.path}" if place else ""
     return Answer(text + mark, place, usage or Totals())

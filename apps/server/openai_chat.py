@@ -1,4 +1,4 @@
-"""Chat completions as OpenAI has them, the models there are, and the pictures of answers."""
+"""The routes of OpenAI's Chat Completions, of the list of models, and of pictures in answers."""
 
 import asyncio
 import secrets
@@ -13,8 +13,8 @@ from pydantic_core import to_json
 from ...agent.report import Totals
 from ...tools.errors import InputError
 from .hub import AHub, APerson, error_data
-from .openai_answers import Answer, Begun, agents, awaited, base_of, begin, problem
-from .openai_request import ChatBody, said_in
+from .openai_answers import Answer, Begun, agents, base_of, begin, final_answer, problem
+from .openai_request import ChatBody, parse_request
 from .sessions import ERRORS
 
 router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
@@ -40,12 +40,12 @@ async def model(name: str, hub: AHub, person: APerson) -> dict[str, Any]:
 async def complete(body: ChatBody, request: Request, hub: AHub, person: APerson) -> Response:
     """Answer what the person says last in a conversation."""
     base = base_of(request, hub)
-    begun = await begin(hub, person, said_in(body, request.headers), base)
+    begun = await begin(hub, person, parse_request(body, request.headers), base)
     facts = {"id": _id(begun), "created": int(time.time()), "model": body.model}
     if body.stream:
         usage = bool((body.stream_options or {}).get("include_usage"))
         return StreamingResponse(_chunks(begun, facts, usage), 200, STREAM, "text/event-stream")
-    answer = await awaited(begun)
+    answer = await final_answer(begun)
     message = {"role": "assistant", "content": answer.text}
     choice = {"index": 0, "message": message, "finish_reason": "stop"}
     whole = {"object": "chat.completion", "choices": [choice], "usage": _usage(answer.usage)}
@@ -79,7 +79,7 @@ async def picture(
 async def _chunks(
     begun: Answer | Begun, facts: dict[str, Any], usage: bool
 ) -> AsyncGenerator[bytes]:
-    """An answer as it comes."""
+    """Yield an answer as the chunks of a streamed chat completion."""
 
     def chunk(*choices: Any, **more: Any) -> bytes:
         kind = {"object": "chat.completion.chunk", "choices": choices}
@@ -90,7 +90,7 @@ async def _chunks(
 
     yield part({"role": "assistant", "content": ""})
     try:
-        async for answer in begun.told():
+        async for answer in begun.answers():
             if answer is None:
                 yield b": at it\n\n"
                 continue
@@ -105,7 +105,7 @@ async def _chunks(
 
 
 def frame(data: dict[str, Any], event: str | None = None) -> bytes:
-    """A server-sent event."""
+    """Return a server-sent event."""
     named = f"event: {event}\n".encode() if event else b""
     return named + b"data: " + to_json(data) + b"\n\n"
 

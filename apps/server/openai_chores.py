@@ -1,7 +1,7 @@
-"""What chat programs ask of the model for themselves: titles, tags, suggestions, search queries.
+"""Chores, which chat programs ask of the model for themselves: titles, tags, search queries.
 
-Taken for words of a person these would be orders to robots: they are told by several signs and
-answered here, without a turn, a tool, or a look at any session.
+Taken for a person's words, these would be orders to robots. They are recognized by several signs
+and answered here, without a turn, a tool, or a look at any session.
 """
 
 import re
@@ -9,10 +9,10 @@ import textwrap
 
 from pydantic_core import to_json
 
-from .openai_request import Said
+from .openai_request import ChatRequest
 
 TASK = re.compile(r"\w+_generation|function_calling")
-"""How Open WebUI names chores, where it does."""
+"""The names that Open WebUI gives to chores, where it names them."""
 KNOWN = re.compile(
     r"\s*#+ *\**task\b|.*<chat_history>"
     r"|.*return the correct tool\(s\) from the list of available tools"
@@ -30,9 +30,9 @@ SIGNS = (
         re.I,
     ),
 )
-"""What is wanted, of what, in which form: only all three make a chore."""
+"""What is wanted, about what, in which form: only all three signs together make a chore."""
 HEAD = 400
-"""Characters of a system's message that tell a chore; long ones speak of everything."""
+"""Characters of a system message to search for signs; long messages mention everything."""
 SUGGESTIONS = ("A bit further out", "How far apart are the robots?", "Undo")
 KINDS: tuple[tuple[str, str, object], ...] = (
     (r"tool_calls|function_calling", "tool_calls", ()),
@@ -42,7 +42,7 @@ KINDS: tuple[tuple[str, str, object], ...] = (
     (r"search quer|query_", "queries", ()),
     (r"\bimage generation\b|image_prompt", "prompt", ""),
 )
-"""By what each is told, and what it is given."""
+"""For each kind of chore, its pattern, and the name and value that it is answered with."""
 TITLE = re.compile(r"\b(title|name)\b|title_", re.I)
 SPOKEN = re.compile(r"^\W*(?:user|human)\W*?: *(\S.*)$", re.I | re.M)
 HISTORY = re.compile(r"<chat_history>|^\W*(?:user|human)\W*?:", re.I | re.M)
@@ -52,32 +52,32 @@ NOTHING = (
 )
 
 
-def chore(said: Said) -> str | None:
-    """The answer to a chore; None for what a person says."""
-    text, system = said.last.text, said.system
-    told = text if _tells(text, None) else system if _tells(system, HEAD) else ""
-    if not told and not TASK.fullmatch(said.task):
+def chore(request: ChatRequest) -> str | None:
+    """Return the answer to a chore; None if the message is a person's."""
+    text, system = request.last.text, request.system
+    prompt = text if _is_chore(text, None) else system if _is_chore(system, HEAD) else ""
+    if not prompt and not TASK.fullmatch(request.task):
         return None
-    asked = HISTORY.split(f"{said.task}\n{told or text}", maxsplit=1)[0]
+    asked = HISTORY.split(f"{request.task}\n{prompt or text}", maxsplit=1)[0]
     for pattern, name, value in KINDS:
         if re.search(pattern, asked, re.I):
             return to_json({name: value}).decode()
-    as_json = said.as_json or "json" in asked.lower()
+    as_json = request.as_json or "json" in asked.lower()
     if TITLE.search(asked):
-        title = _title(said)
+        title = _title(request)
         return to_json({"title": title, "language": "English"}).decode() if as_json else title
     if "emoji" in asked.lower():
         return "🤖"
     return "{}" if as_json else NOTHING
 
 
-def _tells(text: str, head: int | None) -> bool:
-    """Whether a text is that of a chore, by its very words or by all signs in its beginning."""
+def _is_chore(text: str, head: int | None) -> bool:
+    """Return whether a text is a chore, by known wording or by all signs within its head."""
     return bool(KNOWN.match(text)) or all(sign.search(text[:head]) for sign in SIGNS)
 
 
-def _title(said: Said) -> str:
-    """A title from what the person said first."""
-    quoted = SPOKEN.search(said.last.text)
-    first = quoted[1] if quoted else said.users[0].text if len(said.users) > 1 else ""
+def _title(request: ChatRequest) -> str:
+    """Return a title made from the person's first message."""
+    quoted = SPOKEN.search(request.last.text)
+    first = quoted[1] if quoted else request.users[0].text if len(request.users) > 1 else ""
     return textwrap.shorten(first, 50, placeholder="…") or "Robots"

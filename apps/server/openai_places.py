@@ -1,7 +1,7 @@
-"""In which session, and after which turn of it, what a chat client sends belongs.
+"""The place of a chat client's message: the session, and the turn in it, that it follows.
 
-Such clients send a whole history and no session. Where it goes on elsewhere than at its session's
-end, it goes on in a fork. All of it is found again in the store, by any process.
+Such clients send a whole history and no session. A history that branches off before its session's
+end continues in a fork. Any process finds all of this again in the store.
 """
 
 import asyncio
@@ -15,72 +15,76 @@ from ...agent.store.protocol import Event, StoredSession, files_named
 from ...tools.errors import InputError, StorageError
 from .forms import SessionFacts
 from .hub import Hub, check_owner
-from .openai_request import Message, Place, Said, digest
+from .openai_request import ChatRequest, Message, Place, digest
 from .sessions import check_room, owned
 from .tokens import Person
 
 SAME = timedelta(minutes=10)
-"""For so long a first message that is sent again is the same."""
+"""How long a first message that is sent again counts as the same."""
 PICTURE = ".picture"
-"""What the key of a turn ends with that brings the picture of the next one."""
+"""The suffix of the key of a turn that only sets the picture for the next one."""
 MARK = 12
-"""Digits of a digest by which a session is found again, in its name."""
+"""Digits of a digest in a session's name, by which the session is found again."""
 
 
 @asynccontextmanager
-async def alone(hub: Hub, person: Person) -> AsyncGenerator[None]:
-    """One search at a time for each person, among all processes: none begins what another has."""
+async def person_lock(hub: Hub, person: Person) -> AsyncGenerator[None]:
+    """Hold a person's lock, across all processes, so that no session is opened twice."""
     while (held := hub.service.store.lock(f"chats-{person.name}")) is None:
         await asyncio.sleep(0.02)
     with held:
         yield
 
 
-async def find(
-    hub: Hub, person: Person, said: Said, *, here: bool = False
+async def find_session(
+    hub: Hub, person: Person, request: ChatRequest, *, here: bool = False
 ) -> tuple[str, str | None] | None:
-    """The session to go on in, and the key of the turn; None where nothing has begun.
+    """Return the session to go on in and the key of the turn; None if no session has begun.
 
     Args:
-        here: not to fork, whatever has happened since.
+        here: whether never to fork, whatever has happened since.
 
     Raises:
-        InputError: there is no such session of theirs, or no room for a fork.
+        InputError: they have no such session, or no room for a fork.
     """
-    place = said.place or await _remembered(hub, person, said)
+    place = request.place or await _remembered(hub, person, request)
     if place is None:
         return None
     events = await _events(hub, check_owner(place.session, person))
-    key = None if len(said.users) == 1 else digest(said.who, *said.users)
+    key = None if len(request.users) == 1 else digest(request.who, *request.users)
     if place.turn == 0:
         return place.session, key
-    if said.place is not None:
-        for message in said.since[:-1]:  # those whose answers the client has lost
-            place, events = await _answered(hub, person, place, message, events)
-        key = _key(place, said.last)
+    if request.place is not None:
+        for message in request.since[:-1]:  # messages whose answers the client lost
+            place, events = await _follow_up(hub, person, place, message, events)
+        key = _key(place, request.last)
     assert key is not None, "a history that is remembered has more than one message"
-    return place.session if here else await _in_session(hub, person, said, place, key, events), key
+    return place.session if here else await _in_session(
+        hub, person, request, place, key, events
+    ), key
 
 
-def name_of(said: Said, key: str) -> str:
-    """The name of a session, by which it is found again."""
-    words = next((m.text for m in said.users if m.text), "")
+def name_of(request: ChatRequest, key: str) -> str:
+    """Return the name of a session, with marks by which it is found again."""
+    words = next((m.text for m in request.users if m.text), "")
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
-    return " ".join([line[:60], f"[{key[:MARK]}]", *([_chat_mark(said)] if said.chat else [])])
+    return " ".join(
+        [line[:60], f"[{key[:MARK]}]", *([_chat_mark(request)] if request.chat else [])]
+    )
 
 
-async def begun_before(hub: Hub, person: Person, key: str) -> str | None:
-    """The session that a first message began when it was sent a short while ago."""
+async def recently_opened(hub: Hub, person: Person, key: str) -> str | None:
+    """Return the session that the same first message opened within `SAME`, or None."""
     found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
     since = (datetime.now(UTC) - SAME).isoformat()
     return next((facts.id for facts in found if facts.created >= since), None)
 
 
 async def run_at(hub: Hub, place: Place) -> Run:
-    """A turn, as its session was when it ended.
+    """Return the run of a session as it was when a turn ended.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such turn (`missing`).
     """
     held, events = await hub.service.fresh(place.session), await _events(hub, place.session)
     begun = [e.number for e in events if e.kind in STAMPED]
@@ -92,25 +96,25 @@ async def run_at(hub: Hub, place: Place) -> Run:
     return await asyncio.to_thread(load_run, _Until(stored, place.turn))
 
 
-async def _remembered(hub: Hub, person: Person, said: Said) -> Place | None:
-    """Where a history without any message of ours goes on; turn 0 for a session's end."""
-    keys = [digest(said.who, *said.users[:n]) for n in range(len(said.users) - 1, 0, -1)]
+async def _remembered(hub: Hub, person: Person, request: ChatRequest) -> Place | None:
+    """Return the place where a history without our messages goes on; turn 0 for a session's end."""
+    keys = [digest(request.who, *request.users[:n]) for n in range(len(request.users) - 1, 0, -1)]
     marks = [f"[{key[:MARK]}]" for key in keys]
-    chat = _chat_mark(said) if said.chat else None
+    chat = _chat_mark(request) if request.chat else None
     listed = await asyncio.to_thread(_marked, hub, person, *marks, *([chat] if chat else []))
     for facts in listed:
         turns = _turns(await _events(hub, facts.id))
         if number := next((turns[key] for key in keys if key in turns), None):
             return Place(facts.id, number)
-    if said.last.pictures and not keys:
-        return None  # another chat begins as this one did
+    if request.last.pictures and not keys:
+        return None  # another chat may begin with the same message
     return next((Place(f.id, 0) for f in listed if chat and chat in f.name), None)
 
 
 async def _in_session(
-    hub: Hub, person: Person, said: Said, place: Place, key: str, events: Sequence[Event]
+    hub: Hub, person: Person, request: ChatRequest, place: Place, key: str, events: Sequence[Event]
 ) -> str:
-    """A session in which nothing but this request has followed a turn."""
+    """Return a session in which nothing but this request follows the turn, forking if need be."""
     later = [e for e in events[place.turn :] if e.kind in STAMPED]
     if not later or later[0].data.get("key") in (key, key + PICTURE):
         return place.session
@@ -119,13 +123,13 @@ async def _in_session(
     await asyncio.to_thread(check_room, hub, person)
     kept, store = _until(events, place.turn), hub.service.store
     files = files_named(kept, store.open(place.session).artefacts)
-    return store.create(name_of(said, key), kept, files, person.name).id
+    return store.create(name_of(request, key), kept, files, person.name).id
 
 
-async def _answered(
+async def _follow_up(
     hub: Hub, person: Person, place: Place, message: Message, events: Sequence[Event]
 ) -> tuple[Place, Sequence[Event]]:
-    """Where a message led that was said at a place, with the events there; else the same place."""
+    """Return the place of the turn that a message began, and its events; if none, those given."""
     key = _key(place, message)
     fork = None if key in _turns(events) else await _fork_for(hub, person, key)
     there = events if fork is None else await _events(hub, fork)
@@ -134,13 +138,13 @@ async def _answered(
 
 
 async def _fork_for(hub: Hub, person: Person, key: str) -> str | None:
-    """The session that was made for a message."""
+    """Return the session that was made for a message, or None."""
     found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
     return found[0].id if found else None
 
 
 def _until(events: Sequence[Event], turn: int) -> tuple[Event, ...]:
-    """The events up to the end of a turn."""
+    """Return the events up to the end of a turn."""
     for event in events[turn:]:
         if event.kind == "end":
             return tuple(events[: event.number])
@@ -158,29 +162,29 @@ async def _events(hub: Hub, session: str) -> tuple[Event, ...]:
 
 
 def _marked(hub: Hub, person: Person, *marks: str) -> list[SessionFacts]:
-    """The sessions of a person with one of these marks in their names, the newest first."""
+    """Return a person's sessions whose names have one of the marks, the newest first."""
     if not marks:
         return []
     found = owned(hub, person, marks[0] if len(marks) == 1 else "")
     return [facts for facts in found if any(mark in facts.name for mark in marks)]
 
 
-def _chat_mark(said: Said) -> str:
-    return f"[{digest('chat', said.who, said.chat)[:MARK]}]"
+def _chat_mark(request: ChatRequest) -> str:
+    return f"[{digest('chat', request.who, request.chat)[:MARK]}]"
 
 
 def _key(place: Place, message: Message) -> str:
-    """The key of what is said after a message of ours."""
+    """Return the key of a message that follows one of ours."""
     return digest(place.session, place.turn, message)
 
 
 def _turns(events: Sequence[Event]) -> dict[str | None, int]:
-    """The numbers of turns, by the keys they were asked for under."""
+    """Return the numbers of turns by the keys of the requests for them."""
     return {e.data.get("key"): e.number for e in events if e.kind in STAMPED}
 
 
 class _Until(FedSession):
-    """A stored session as far as a turn of it."""
+    """A view of a stored session that ends with a turn."""
 
     def __init__(self, stored: StoredSession, turn: int) -> None:
         super().__init__(stored, Feed(stored, ()))

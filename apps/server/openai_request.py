@@ -1,6 +1,6 @@
-"""What a chat client asks, in either of OpenAI's two forms, as one value.
+"""The request of a chat client, in either of OpenAI's two formats, as one value.
 
-What the person said last is carried out; the rest of a history only tells where that belongs.
+The person's last message is carried out; the rest of the history only shows where it belongs.
 Messages of systems, tools and assistants are never obeyed.
 """
 
@@ -16,16 +16,16 @@ from pydantic_core import PydanticSerializationError, to_json
 from ...tools.errors import InputError
 
 OURS = re.compile(r"/v1/pictures/([a-z0-9_-]+)/(\d+)")
-"""What each message of ours ends with: its session and turn, in the address of its picture."""
+"""Finds the session and turn in the address that each of our messages ends with."""
 RESPONSE = re.compile(r"resp_(?:none_[0-9a-f]+|([a-z0-9_-]+)_(\d+))")
 
 
 @dataclass(frozen=True)
 class Place:
-    """What a message of ours came of.
+    """The turn that one of our messages answers.
 
     Attributes:
-        turn: number of the event that began it; 0 for wherever the session stands.
+        turn: number of the event that began it; 0 for the session's current end.
     """
 
     session: str
@@ -33,7 +33,7 @@ class Place:
 
     @property
     def path(self) -> str:
-        """What tells it again, in a message of ours."""
+        """The path by which our messages refer to this place."""
         return f"/v1/pictures/{self.session}/{self.turn}"
 
 
@@ -53,14 +53,14 @@ class Message(BaseModel):
 
     @property
     def text(self) -> str:
-        """What it says."""
+        """The text of its parts."""
         parts = self.content or ""
         said = parts if isinstance(parts, str) else "\n".join(p.text for p in parts if p.text)
         return said.strip()
 
     @property
     def pictures(self) -> tuple[str, ...]:
-        """Addresses of its pictures; empty for one that is only named."""
+        """Addresses of its pictures, "" for one without an address, such as a file's id."""
         return tuple(
             str(p.image_url.get("url", "") if isinstance(p.image_url, dict) else p.image_url or "")
             for p in self._parts
@@ -69,7 +69,7 @@ class Message(BaseModel):
 
     @property
     def others(self) -> tuple[str, ...]:
-        """Kinds of what else it has."""
+        """The types of its parts that are neither text nor a picture."""
         known = ("text", "input_text", "image_url", "input_image")
         return tuple(p.type for p in self._parts if p.type not in known)
 
@@ -79,7 +79,7 @@ class Message(BaseModel):
 
 
 class Body(BaseModel):
-    """What both forms have; what else they may have changes nothing here."""
+    """The fields used from both formats; any others are ignored."""
 
     model: str = Field(min_length=1, max_length=200)
     stream: bool | None = None
@@ -106,24 +106,24 @@ class ResponsesBody(Body):
 
     @property
     def messages(self) -> list[Message]:
-        """Its input, as messages."""
+        """The input as messages."""
         said = self.input
         return [Message(role="user", content=said)] if isinstance(said, str) else said
 
 
 @dataclass(frozen=True)
-class Said:
-    """What a person said, where.
+class ChatRequest:
+    """The request of a chat client: what the person said, and where in which conversation.
 
     Attributes:
-        model: who is to decide.
-        users: the person's messages, the last one last.
+        model: name of the model that is to decide.
+        users: the person's messages, oldest first.
         since: those after `place`.
-        place: of the last message of ours in the history, or that the client names.
-        chat: the client's name for the conversation; empty if it gives none.
-        who: what tells apart the people behind one token.
-        system: the first of the client's own instructions, which tell its chores.
-        task: the chore, where the client names it.
+        place: of our last message in the history, or of the response or session the client names.
+        chat: the client's id of the conversation; empty if it gives none.
+        who: distinguishes the people behind one token.
+        system: the client's own instructions, by which chores are recognized.
+        task: the chore, if the client names it; else empty.
         as_json: whether JSON is wanted.
     """
 
@@ -139,15 +139,15 @@ class Said:
 
     @property
     def last(self) -> Message:
-        """What is carried out."""
+        """The message to carry out."""
         return self.users[-1]
 
 
-def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
-    """What a request says.
+def parse_request(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> ChatRequest:
+    """Return what a request says.
 
     Raises:
-        InputError: something in it cannot be done.
+        InputError: something in it is not supported, or it has no message of a person.
     """
     _check(body)
     messages, place, after = body.messages, None, 0
@@ -163,7 +163,7 @@ def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
         raise InputError("The request holds no message of role user; give what the person says.")
     facts = {k: str(v) for k, v in (body.metadata or {}).items()}
     chat = facts.get("chat_id") or facts.get("conversation_id")
-    return Said(
+    return ChatRequest(
         model=body.model,
         users=users,
         since=tuple(m for m in messages[after:] if m.role == "user"),
@@ -177,10 +177,10 @@ def said_in(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) -> Said:
 
 
 def place_of(response: str) -> Place | None:
-    """The place of a response; None for one that came of no turn.
+    """Return the place of a response, given its id; None for one that answers no turn.
 
     Raises:
-        InputError: it is none of ours (`missing`).
+        InputError: the id is not one of ours (`missing`).
     """
     found = RESPONSE.fullmatch(response)
     if found is None:
@@ -189,7 +189,11 @@ def place_of(response: str) -> Place | None:
 
 
 def digest(*parts: object) -> str:
-    """A hash by which the same request is known again."""
+    """Return a hash by which the same request is recognized; 32 hexadecimal digits.
+
+    Raises:
+        InputError: a part is not valid text.
+    """
     given = [p.model_dump() if isinstance(p, Message) else p for p in parts]
     try:
         return hashlib.sha256(to_json(given)).hexdigest()[:32]
@@ -198,7 +202,7 @@ def digest(*parts: object) -> str:
 
 
 def _check(body: Body) -> None:
-    """Refuse what would be left out without a word."""
+    """Refuse options that would otherwise be silently ignored."""
     if (body.n or 1) > 1:
         raise InputError(f"n is {body.n}; there is one answer to a message: leave n out, or 1.")
     if body.audio or "audio" in (body.modalities or ()):

@@ -1,4 +1,4 @@
-"""Responses as OpenAI has them: each is a turn of a session, found again by its id."""
+"""The routes of OpenAI's Responses API: each response is a turn, found again by its id."""
 
 import secrets
 import time
@@ -10,10 +10,10 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from ...tools.errors import InputError
 from .hub import AHub, APerson, check_owner
-from .openai_answers import USUAL, Answer, Begun, awaited, base_of, begin, problem, told
+from .openai_answers import USUAL, Answer, Begun, answer_of, base_of, begin, final_answer, problem
 from .openai_chat import STREAM, frame
 from .openai_places import run_at
-from .openai_request import ResponsesBody, place_of, said_in
+from .openai_request import ResponsesBody, parse_request, place_of
 from .sessions import ERRORS
 
 router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
@@ -22,12 +22,12 @@ router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
 @router.post("/responses")
 async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APerson) -> Response:
     """Answer what the person says."""
-    said = said_in(body, request.headers)
-    begun = await begin(hub, person, said, base_of(request, hub))
+    asked = parse_request(body, request.headers)
+    begun = await begin(hub, person, asked, base_of(request, hub))
     facts = _response(begun, body.model) | {"previous_response_id": body.previous_response_id}
     if body.stream:
         return StreamingResponse(_events(begun, facts), 200, STREAM, "text/event-stream")
-    return JSONResponse(_completed(await awaited(begun), facts))
+    return JSONResponse(_completed(await final_answer(begun), facts))
 
 
 @router.get("/responses/{response}")
@@ -39,12 +39,12 @@ async def again(response: str, request: Request, hub: AHub, person: APerson) -> 
     if place is None:
         raise InputError(f"The response {response!r} was not kept.", "missing")
     check_owner(place.session, person)
-    answer = await told(place, await run_at(hub, place), base_of(request, hub))
+    answer = await answer_of(place, await run_at(hub, place), base_of(request, hub))
     return JSONResponse(_completed(answer, _response(answer, USUAL)))
 
 
 async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerator[bytes]:
-    """A response as it comes, in the order that OpenAI's has."""
+    """Yield the events of a streamed response, in the order of OpenAI's."""
     number = 0
 
     def event(kind: str, **data: Any) -> bytes:
@@ -58,7 +58,7 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
     yield event("response.in_progress", response=facts)
     answer = None
     try:
-        async for answer in begun.told():
+        async for answer in begun.answers():
             if answer is None:
                 yield b": at it\n\n"
     except Exception as error:
@@ -78,7 +78,7 @@ async def _events(begun: Answer | Begun, facts: dict[str, Any]) -> AsyncGenerato
 
 
 def _response(begun: Answer | Begun, model: str) -> dict[str, Any]:
-    """A response before it has come to anything."""
+    """Return a response that is still in progress."""
     place = begun.place
     made_of = f"{place.session}_{place.turn}" if place else f"none_{secrets.token_hex(8)}"
     return {
@@ -100,7 +100,7 @@ def _response(begun: Answer | Begun, model: str) -> dict[str, Any]:
 
 
 def _completed(answer: Answer, facts: dict[str, Any]) -> dict[str, Any]:
-    """A response at its end."""
+    """Return a completed response."""
     used, item = answer.usage, f"msg_{facts['id'].removeprefix('resp_')}"
     usage = {
         "input_tokens": used.input_tokens,
@@ -114,7 +114,7 @@ def _completed(answer: Answer, facts: dict[str, Any]) -> dict[str, Any]:
 
 
 def _message(item: str, text: str | None = None) -> dict[str, Any]:
-    """The one item of a response; without text while it is under way."""
+    """Return the one item of a response; without text while it is in progress."""
     status, content = "in_progress" if text is None else "completed", [_part(text or "")]
     said = {"role": "assistant", "status": status, "content": content if text is not None else []}
     return {"id": item, "type": "message", **said}

@@ -1,4 +1,4 @@
-"""The page that a server opens: its files as they are in the package, nothing from elsewhere."""
+"""The web page of a server: its files as they are in the package, nothing from other sites."""
 
 import json
 from importlib import resources
@@ -17,12 +17,12 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""Scripts, styles, pictures and requests are the server's own; pictures may be made by the page."""
+"""Allows only the server's own scripts, styles, pictures and requests, and the page's own blobs."""
 POLICY_NAME = "Content-Security-Policy"
 ALONE = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; " + (
     "style-src 'unsafe-inline'; img-src data:"
 )
-"""A report is a page of its own: to it this server is another site."""
+"""The policy of a report, sandboxed so that this server is another site to it."""
 HEADERS = {
     POLICY_NAME: POLICY,
     "X-Content-Type-Options": "nosniff",

@@ -1,4 +1,4 @@
-"""Runs a server until it is told to end: robots are held first, then turns and streams end."""
+"""The run of a server until it must end: robots are held first, then turns and streams end."""
 
 import json
 import logging
@@ -17,18 +17,18 @@ from .settings import ServerSettings
 from .tokens import Tokens
 
 BACKLOG = 512
-"""Connections beside event streams that may be open at a time."""
+"""Most connections open at a time, besides event streams."""
 
 
 class Server(uvicorn.Server):
-    """A server that holds robots before it waits for anything."""
+    """A server that, at its end, holds robots before it waits for anything."""
 
     def __init__(self, config: uvicorn.Config, hub: Hub) -> None:
         super().__init__(config)
         self._hub = hub
 
     async def startup(self, sockets: Any = None) -> None:
-        """Listen, and say where."""
+        """Start listening, and print the address."""
         await super().startup(sockets)
         if self.should_exit:
             return
@@ -37,14 +37,18 @@ class Server(uvicorn.Server):
         say(f"formup: serving on http://{shown}:{port}; Ctrl-C ends it.", error=True)
 
     async def shutdown(self, sockets: Any = None) -> None:
-        """Hold robots, end turns and streams, then let requests come to their ends."""
+        """Hold robots, end turns and streams, then let requests finish."""
         self._hub.leaving = True
         await self._hub.service.leave()
         await super().shutdown(sockets)
 
 
 def run(service: Service, settings: ServerSettings) -> int:
-    """Serve until SIGTERM or Ctrl-C; what to exit with."""
+    """Serve until SIGTERM or Ctrl-C, and return the exit code.
+
+    Raises:
+        InputError: the address cannot be listened on.
+    """
     log()
     app = make_app(service, settings, Tokens(settings.tokens_file))
     config = uvicorn.Config(
@@ -62,17 +66,17 @@ def run(service: Service, settings: ServerSettings) -> int:
     server = Server(config, app.state.hub)
     try:
         server.run()
-    except SystemExit:  # as uvicorn ends where it cannot listen; its log says why
+    except SystemExit:  # uvicorn exits if it cannot listen; its log says why
         where = f"{settings.host}:{settings.port}"
         raise InputError(f"{where} cannot be listened on: give another --port or --host.") from None
     return 0 if server.started else 4
 
 
 class JsonLines(logging.Formatter):
-    """Log records as JSON, a line each; of a request no query and no headers."""
+    """Formats log records as JSON, one per line, without the query or headers of requests."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """One line."""
+        """Return one line."""
         made = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created))
         facts: dict[str, Any] = {"time": f"{made}Z", "level": record.levelname.lower()}
         if record.name == "uvicorn.access" and isinstance(record.args, tuple):
@@ -87,10 +91,10 @@ class JsonLines(logging.Formatter):
 
 
 def log() -> None:
-    """Log to standard error."""
+    """Set up logging to stderr as JSON lines."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(JsonLines())
-    logging.basicConfig(level=logging.WARNING, handlers=[handler])  # before a library does
+    logging.basicConfig(level=logging.WARNING, handlers=[handler])  # before any library does it
     for name in ("uvicorn", "formup"):
         logger = logging.getLogger(name)
         logger.handlers, logger.propagate = [handler], False

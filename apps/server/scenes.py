@@ -1,6 +1,6 @@
-"""What a page looks at: the picture, things in it, plans as numbers, what would come of an edit.
+"""The routes a page draws from: the picture, things in it, plans as numbers, previews of edits.
 
-Nothing here changes a session; what is tried becomes true by a turn alone.
+Nothing here changes a session; only a turn applies an edit that was tried.
 """
 
 import asyncio
@@ -18,17 +18,17 @@ from ...tools.draw.scene import candidate_data, robot_data, scene_data, thing_da
 from ...tools.errors import InputError, ToolError
 from ...tools.perception.image import Picture
 from .forms import Outlined, Pointing, Preview
-from .hub import AHub, APerson, Hub, check_owner, check_seen, need
+from .hub import AHub, APerson, Hub, check_owner, check_seen, require_scope
 from .sessions import ERRORS
 from .tokens import Person
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["page"], responses=ERRORS)
 LONGEST = 2048
-"""Long side, px, of a picture that a page is given; coordinates are those of the whole one."""
+"""Longest side, px, of a picture sent to a page; coordinates are those of the original."""
 
 
-def plainly(error: ToolError) -> InputError:
-    """What a tool cannot do, said to a person."""
+def person_error(error: ToolError) -> InputError:
+    """Return a tool's error as an InputError, worded for a person where the tool has such words."""
     return InputError(str(error.facts.get("plain", error)), error.kind)
 
 
@@ -79,7 +79,7 @@ async def paths(
         plan = context.world.plan(plan_id).plan
         found = await asyncio.to_thread(paths_to, context, plan)
     except ToolError as error:
-        raise plainly(error) from None
+        raise person_error(error) from None
     return {robot: path.round(1).tolist() for robot, path in found.items()}
 
 
@@ -93,12 +93,12 @@ async def things(session: str, hub: AHub, person: APerson) -> list[dict[str, Any
 @router.post("/outline")
 async def outline(session: str, pointing: Pointing, hub: AHub, person: APerson) -> Outlined:
     """The outline of what is pointed at, and how sure it is; nothing is decided by it."""
-    need(person, "plan")
+    require_scope(person, "plan")
     context = (await _session(hub, session, person)).context
     try:
         found = await asyncio.to_thread(measured, context, pointing.prompt)
     except ToolError as error:
-        raise plainly(error) from None
+        raise person_error(error) from None
     _, target, threshold = found
     return Outlined(
         **thing_data(target.id, target.label, target.outline),
@@ -112,10 +112,10 @@ async def outline(session: str, pointing: Pointing, hub: AHub, person: APerson) 
 @router.post("/preview")
 async def preview(session: str, wanted: Preview, hub: AHub, person: APerson) -> dict[str, Any]:
     """What edits would make of a plan: places, and what its certificate would say."""
-    need(person, "plan")
+    require_scope(person, "plan")
     world = (await _session(hub, session, person)).context.world
     try:
         plan = await asyncio.to_thread(previewed, world, wanted.edits, wanted.plan_id)
     except ToolError as error:
-        raise plainly(error) from None
+        raise person_error(error) from None
     return verdict_data(plan) | {"robots": robot_data(plan)}

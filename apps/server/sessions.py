@@ -1,4 +1,4 @@
-"""Sessions over HTTP: begun with a picture, listed, renamed, forked, deleted; plans and files."""
+"""The routes of sessions: begin with a picture, list, rename, fork, delete; plans and files."""
 
 import asyncio
 import io
@@ -15,7 +15,7 @@ from ...tools.draw import draw_plan
 from ...tools.errors import InputError
 from ...tools.perception.image import Picture, picture_from_bytes
 from .forms import AgentFacts, Error, Fork, Name, SessionFacts, SessionState, TurnState, Waits
-from .hub import AHub, APerson, Hub, check_owner, check_seen, need
+from .hub import AHub, APerson, Hub, check_owner, check_seen, require_scope
 from .tokens import Person
 
 ERRORS: dict[int | str, dict[str, Any]] = {
@@ -43,25 +43,25 @@ router = APIRouter(prefix="/api", tags=["sessions"], responses=ERRORS)
 
 
 async def picture_sent(request: Request, hub: Hub, name: str) -> Picture:
-    """The picture that is the body of a request.
+    """Return the picture that is the body of a request.
 
     Raises:
-        InputError: it is none that can be used.
+        InputError: as of `checked_picture`.
     """
     return await asyncio.to_thread(checked_picture, await request.body(), name, hub)
 
 
 def checked_picture(data: bytes, name: str, hub: Hub) -> Picture:
-    """A picture from a client, with its size looked at before it is decoded.
+    """Decode a picture from a client, after checking its size.
 
     Raises:
-        InputError: it is none that can be used, or larger than the server allows.
+        InputError: it is not a picture that can be used, or larger than the server allows.
     """
     try:
         with Image.open(io.BytesIO(data)) as header:
             width, height = header.size
     except (UnidentifiedImageError, OSError, ValueError):
-        width = height = 0  # said by whatever decodes it
+        width = height = 0  # the decoder below raises the error
     if width * height > hub.settings.pixels:
         raise InputError(
             f"The picture has {width} by {height} pixels; {hub.settings.pixels:,} are allowed.",
@@ -91,7 +91,7 @@ async def begin(
     seed: Annotated[int, Query(ge=0, le=2**31)] = 0,
 ) -> SessionState:
     """Begin a session about the picture that is the body."""
-    need(person, "plan")
+    require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     picture = await picture_sent(request, hub, name or "picture")
     settings = hub.settings.of_session(
@@ -110,10 +110,10 @@ async def begin(
 
 
 def check_room(hub: Hub, person: Person) -> None:
-    """Refuse more sessions than one token may have.
+    """Refuse another session to a token that has as many as allowed.
 
     Raises:
-        InputError: there are as many (`too_many`).
+        InputError: it has as many (`too_many`).
     """
     number, most = len(owned(hub, person)), hub.settings.sessions
     if number >= most:
@@ -123,10 +123,10 @@ def check_room(hub: Hub, person: Person) -> None:
 def owned(
     hub: Hub, person: Person, text: str = "", also: Collection[str] = ()
 ) -> list[SessionFacts]:
-    """The sessions of a person that have a text in their names or words, the newest first.
+    """Return a person's sessions whose names or words contain a text, the newest first.
 
     Args:
-        also: ids of others.
+        also: ids of sessions of others to include.
     """
     found = hub.service.store.sessions(text)
     return [
@@ -150,10 +150,10 @@ async def state(session: str, hub: AHub, person: APerson) -> SessionState:
 
 
 async def state_of(hub: Hub, session: str) -> SessionState:
-    """A session as it stands, to clients.
+    """Return the current state of a session, as clients get it.
 
     Raises:
-        InputError: there is none.
+        InputError: there is no such session.
     """
     held = await hub.service.fresh(session)
     run, turn = held.run, hub.service.turn(session)
@@ -175,7 +175,7 @@ async def state_of(hub: Hub, session: str) -> SessionState:
 @router.patch("/sessions/{session}")
 async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionState:
     """Call a session otherwise."""
-    need(person, "plan")
+    require_scope(person, "plan")
     mine = check_owner(session, person)
     await asyncio.to_thread(hub.service.store.rename, mine, to.name)
     return await state_of(hub, session)
@@ -184,14 +184,14 @@ async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionS
 @router.delete("/sessions/{session}", status_code=204)
 async def delete(session: str, hub: AHub, person: APerson) -> None:
     """Hold its robots, and delete a session with all that was said in it."""
-    need(person, "plan")
+    require_scope(person, "plan")
     await hub.service.delete(check_owner(session, person))
 
 
 @router.post("/sessions/{session}/forks", status_code=201)
 async def fork(session: str, at: Fork, hub: AHub, person: APerson) -> SessionState:
     """A session of its own that begins as this one did."""
-    need(person, "plan")
+    require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     mine = check_owner(session, person)
     return await state_of(hub, await asyncio.to_thread(hub.service.fork, mine, at.turn))

@@ -1,4 +1,4 @@
-"""What a server is told by its environment: FORMUP_ and the name of a field, in capitals."""
+"""The settings of a server, read from variables FORMUP_ and the name of a field, in capitals."""
 
 import os
 from collections.abc import Mapping
@@ -75,16 +75,16 @@ class ServerSettings(BaseModel):
     )
 
     def of_session(self, **given: Any) -> Settings:
-        """The settings of a new session, with what was given for it."""
+        """Return the settings of a new session, including those given for it."""
         names = ("fleet", "detector", "segmenter", "threshold")
         return Settings(**{name: getattr(self, name) for name in names}, **given)
 
     @classmethod
     def of(cls, environment: Mapping[str, str] = os.environ, **given: object) -> Self:
-        """The settings of an environment; what is given, and not None, wins.
+        """Return the settings of an environment; those given, and not None, override it.
 
         Raises:
-            InputError: one of them is not as it has to be.
+            InputError: a value is not valid.
         """
         named = {n: environment.get(PREFIX + n.upper()) for n in cls.model_fields}
         values = {n: v for n, v in named.items() if v} | {

@@ -1,4 +1,4 @@
-"""What leaves a session: a file of all that was said and planned, and links that only show it."""
+"""The routes that share a session: an export of all it holds, and codes that only show it."""
 
 import asyncio
 import io
@@ -11,7 +11,7 @@ from fastapi import APIRouter, Response
 from ...agent.export import export_json, export_page
 from ...agent.store.protocol import StoredSession
 from .forms import Shared
-from .hub import AHub, APerson, check_owner, need
+from .hub import AHub, APerson, check_owner, require_scope
 from .sessions import ERRORS
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["sharing"], responses=ERRORS)
@@ -45,6 +45,6 @@ async def share(session: str, hub: AHub, person: APerson) -> Shared:
 
     It is sent as `Authorization: Share CODE` and holds as long as the token of who made it.
     """
-    need(person, "plan")
+    require_scope(person, "plan")
     await hub.service.fresh(check_owner(session, person))
     return Shared(code=hub.tokens.share(session))

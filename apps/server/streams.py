@@ -1,7 +1,7 @@
-"""What happens in a session, as server-sent events; they resume after any of them.
+"""The event stream of a session, as server-sent events; it can resume after any of them.
 
-Named as AG-UI names them, `CUSTOM` where it has no name. The id of each is the number of the event
-of the session and its place among those that come of it; poses have none: the latest counts.
+Types are AG-UI's, or `CUSTOM` where it has none. The id of an event is the number of the session's
+event and its index among those made from it; poses have no id, as only the latest counts.
 """
 
 from collections.abc import AsyncIterable, Iterator, Mapping, Sequence
@@ -22,7 +22,12 @@ BEGINS = ("turn", "resume")
 
 
 class Place:
-    """After which event a stream goes on: its number, and how many that came of it were seen."""
+    """Where a stream resumes.
+
+    Args:
+        number: of the last event of the session that was seen whole.
+        seen: how many of the stream's events made from the next one were seen too.
+    """
 
     def __init__(self, number: int, seen: int) -> None:
         self.number, self.seen = number, seen
@@ -35,7 +40,12 @@ async def place_of(
     after: Annotated[int, Query(ge=0, le=2**31)] = 0,
     last: Annotated[str | None, Header(alias="Last-Event-ID", max_length=40)] = None,
 ) -> Place:
-    """Where a client goes on, checked before the stream begins."""
+    """Return where a client's stream resumes; checks the request before the stream begins.
+
+    Raises:
+        InputError: they have no such session, too many streams are open (`too_many`), or
+            Last-Event-ID is malformed.
+    """
     await hub.service.fresh(check_owner(session, person))
     if hub.streams >= hub.settings.streams:
         raise InputError(
@@ -79,18 +89,18 @@ def _event(data: Mapping[str, Any], id: str | None) -> ServerSentEvent:
 
 
 def _run_before(events: Sequence[Event], number: int) -> int:
-    """The number of the turn that an event belongs to."""
+    """Return the number of the turn that the event of a number belongs to; 0 before any turn."""
     return max((e.number for e in events[:number] if e.kind in BEGINS), default=0)
 
 
 def poses_data(told: Poses) -> dict[str, Any]:
-    """Where robots are, px and radians clockwise from the x axis."""
+    """Return robots' poses as an event: px, and radians clockwise from the x axis."""
     poses = [{"id": p.id, "x": p.x, "y": p.y, "heading": p.heading} for p in told.poses]
     return {"type": "CUSTOM", "name": "poses", "value": {"number": told.number, "poses": poses}}
 
 
 def frames(session: str, event: Event, run: int) -> Iterator[dict[str, Any]]:
-    """An event of a session as AG-UI's events.
+    """Yield an event of a session as AG-UI's events.
 
     Args:
         run: the number of the event that began its turn.

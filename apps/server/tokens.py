@@ -1,4 +1,4 @@
-"""Tokens: who may do what at a server. Their file holds names, scopes and hashes, no token."""
+"""Tokens: who may do what at a server. Their file has names, scopes and hashes, but no tokens."""
 
 import hashlib
 import hmac
@@ -19,21 +19,21 @@ from ...tools.store import read_text, write_whole
 
 Scope = Literal["read", "plan", "move", "approve"]
 SCOPES: tuple[Scope, ...] = get_args(Scope)
-"""From the least to the most; each includes those before it. Any of them may stop robots.
+"""From the least to the most; each includes those before it. Any scope may stop robots.
 
-Who may `approve` sees what waits for a yes in the sessions of other tokens, and may give it.
+Whoever may `approve` sees what waits for approval in the sessions of other tokens, and may give it.
 """
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 
 
 @dataclass(frozen=True)
 class Person:
-    """Who asks.
+    """The person who makes a request.
 
     Attributes:
-        name: of their token, which the ids of their sessions begin with; empty where none is
+        name: of their token, with which the ids of their sessions begin; empty if no token is
             needed.
-        sees: the one session that they may look at, and do nothing else; None for all of theirs.
+        sees: the one session that they may look at, and do nothing else; None for all their own.
     """
 
     name: str = ""
@@ -41,12 +41,12 @@ class Person:
     sees: str | None = None
 
     def may(self, scope: Scope) -> bool:
-        """Whether they may do what a scope stands for."""
+        """Return whether their scope includes another."""
         return SCOPES.index(self.scope) >= SCOPES.index(scope)
 
 
 class Entry(BaseModel):
-    """A token as its file has it."""
+    """A token's entry in the file."""
 
     name: str
     scope: Scope
@@ -58,7 +58,7 @@ class Tokens:
     """The tokens of a server.
 
     Args:
-        path: of their file; None for none. It is read again when it has changed.
+        path: of their file, reread when it changes; None if the server needs no tokens.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -66,14 +66,14 @@ class Tokens:
 
     @property
     def needed(self) -> bool:
-        """Whether nobody gets in without one."""
+        """Whether requests need a token."""
         return self._path is not None
 
     def person(self, token: str) -> Person | None:
-        """Who has a token, if anybody does.
+        """Return the owner of a token; None if it is unknown.
 
         Raises:
-            StorageError: their file cannot be read.
+            StorageError: the file cannot be read.
         """
         digest = _hash(token)
         found = None
@@ -83,26 +83,26 @@ class Tokens:
         return found
 
     def mark(self, owner: str, what: str) -> str:
-        """What whoever has it may look at one thing with; a token's hash is the key to it."""
+        """Return a code that lets its holder look at one thing: an HMAC keyed by a token's hash."""
         keys = [entry.sha256 for entry in self.entries() if entry.name == owner]
         return hmac.new("".join(keys).encode(), what.encode(), hashlib.sha256).hexdigest()
 
     def share(self, session: str) -> str:
-        """A code for looking at a session, which holds as long as its owner's token."""
+        """Return a code for looking at a session; it is valid as long as its owner's token."""
         return f"{session}.{self.mark(owner_of(session), f'share {session}')}"
 
     def looking(self, code: str) -> Person | None:
-        """Who has a code for looking at a session, if it is one."""
+        """Return the person that a code lets look at a session; None if the code is not valid."""
         session = code.rpartition(".")[0]
         if not secrets.compare_digest(code.encode(), self.share(session).encode()):
             return None
         return Person(owner_of(session), "read", session)
 
     def entries(self) -> tuple[Entry, ...]:
-        """All there are.
+        """Return the entries of all tokens.
 
         Raises:
-            StorageError: their file cannot be read.
+            StorageError: the file cannot be read.
         """
         if self._path is None or not self._path.exists():
             return ()
@@ -112,10 +112,10 @@ class Tokens:
         return self._entries
 
     def add(self, name: str, scope: str) -> str:
-        """Make a token, which is shown this once.
+        """Make a token and return it; it cannot be read back later.
 
         Raises:
-            InputError: the name is taken or none, or there is no such scope.
+            InputError: the name is taken or not valid, or there is no such scope.
         """
         if not _NAME.fullmatch(name):
             raise InputError(
@@ -133,10 +133,10 @@ class Tokens:
         return token
 
     def remove(self, name: str) -> None:
-        """Take a token away; its sessions stay.
+        """Revoke a token; its sessions stay.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: there is no token of that name.
         """
         kept = tuple(entry for entry in self.entries() if entry.name != name)
         if len(kept) == len(self.entries()):
@@ -159,5 +159,5 @@ def _parsed(path: Path) -> tuple[Entry, ...]:
 
 
 def _hash(token: str) -> str:
-    """Tokens are 256 random bits, so that a plain hash is enough."""
+    """Return the hash of a token; as tokens are 256 random bits, a plain hash is enough."""
     return hashlib.sha256(token.encode()).hexdigest()

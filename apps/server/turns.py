@@ -1,4 +1,4 @@
-"""Turns over HTTP: what is said, edits, undo, approvals, deployments; stop passes always.
+"""The routes of turns: words, edits, undo, approvals, deployments; stop is always possible.
 
 A turn is never lost with its request: it goes on to its end, and its number finds it again.
 """
@@ -14,7 +14,7 @@ from ...agent.store.protocol import Event
 from ...agent.turns import Asked, Turn
 from ...tools.errors import InputError
 from .forms import Approval, Deployment, Edits, Key, Message, TurnState, Undo
-from .hub import AHub, APerson, Hub, asked_by, check_owner, check_seen, need
+from .hub import AHub, APerson, Hub, asked_by, check_owner, check_seen, require_scope
 from .sessions import ERRORS, PICTURE, picture_sent
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["turns"], responses=ERRORS)
@@ -27,7 +27,7 @@ RUNNING: dict[int | str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Asking:
-    """Who asks for a turn of which session, and how long they wait for its end."""
+    """A request for a turn: who asks, in which session, and how long they wait for its end."""
 
     hub: Hub
     session: str
@@ -36,15 +36,15 @@ class Asking:
     response: Response
 
     async def answer(self, turn: Turn) -> TurnState:
-        """The turn at its end, or as it is after so long, or once robots drive."""
+        """Return the turn's state at its end, after the wait, or once robots drive."""
         return await _answer(self.hub, self.session, turn, self.wait, self.response)
 
 
 def asking(
     session: str, hub: AHub, person: APerson, response: Response, key: AKey = None, wait: Wait = 30
 ) -> Asking:
-    """Who asks, if they may plan in that session."""
-    need(person, "plan")
+    """Return who asks, once it is known that they may plan in that session."""
+    require_scope(person, "plan")
     return Asking(hub, check_owner(session, person), asked_by(person, key), wait, response)
 
 
@@ -90,7 +90,7 @@ async def deploy(
     key: Annotated[Key, Header(alias="Idempotency-Key")],
 ) -> TurnState:
     """Drive the robots to a plan: a job, done once for a key. Real ones wait for an approval."""
-    need(person, "move")
+    require_scope(person, "move")
     asked, name = asked_by(person, key), check_owner(session, person)
     run = (await hub.service.fresh(name)).run
     known = run is not None and wanted.plan_id in run.world.plans
@@ -107,7 +107,7 @@ async def approve(
     session: str, given: Approval, hub: AHub, person: APerson, response: Response
 ) -> TurnState:
     """Say yes to exactly the plan that waits; real robots then drive to it."""
-    need(person, "move")
+    require_scope(person, "move")
     asked = asked_by(person)
     name = await check_seen(hub, session, person)
     turn = hub.service.approve(name, given.plan_id, given.nonce, asked=asked)
@@ -147,7 +147,7 @@ async def turn(
 async def _answer(
     hub: Hub, session: str, turn: Turn, wait: float, response: Response, *, moving: bool = True
 ) -> TurnState:
-    """A turn at its end, or after so long, or, if that ends the wait, once robots drive."""
+    """Return a turn's state at its end, after `wait` seconds, or once robots drive if `moving`."""
     try:
         await turn.begin()
         run = await turn.wait(wait, moving=moving)
@@ -163,10 +163,10 @@ async def _answer(
 
 
 async def turn_state(hub: Hub, session: str, number: int) -> TurnState:
-    """A turn from the log; the last one with its whole report.
+    """Return a turn's state from the log; that of the last turn has its whole report.
 
     Raises:
-        InputError: there is none of that number.
+        InputError: there is no turn of that number.
     """
     held = await hub.service.fresh(session)
     events = await asyncio.to_thread(hub.service.events, session)
@@ -181,10 +181,10 @@ async def turn_state(hub: Hub, session: str, number: int) -> TurnState:
 
 
 def state_in(events: Sequence[Event], number: int) -> TurnState:
-    """A turn from the events of a session.
+    """Return a turn's state from the events of a session.
 
     Raises:
-        InputError: there is none of that number.
+        InputError: there is no turn of that number.
     """
     begun = events[number - 1] if 1 <= number <= len(events) else None
     if begun is None or begun.kind not in ("turn", "resume"):

@@ -1,1 +1,1 @@
-"""The agent loop's overhead beside bare HTTP and other agent frameworks."""
+"""The overhead of the agent loop, beside bare HTTP and other agent frameworks."""

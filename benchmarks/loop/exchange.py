@@ -1,4 +1,4 @@
-"""What every framework is asked to do: call one tool until the scripted server is satisfied."""
+"""The task of every framework: to call one tool until the scripted server is satisfied."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ DESCRIPTION = "Count the points that lie inside the unit circle."
 
 
 def compute(points: Iterable[tuple[float, float]]) -> str:
-    """The tool: how many (x, y) lie in the unit circle, and the sum of their squared radii."""
+    """Return the tool's text: how many (x, y) are in the unit circle, the sum of squared radii."""
     squares = [x * x + y * y for x, y in points]
     inside = sum(square <= 1.0 for square in squares)
     return f"{inside} inside, sum of squares {sum(squares):.3f}"

@@ -1,9 +1,8 @@
-"""Processor time per turn of agent loops, side by side: bare httpx, formup, and other frameworks.
+"""CPU time per turn of agent loops: bare httpx, formup and other frameworks.
 
-    python compare.py ROUNDS FOLDER      environments of the others lie in FOLDER/NAME
-
-All do the same exchanges with the same scripted server. A round measures each once, in an order
-that alternates, and only ratios within a round count: medians, and quartiles in brackets.
+`python run.py ROUNDS FOLDER`, with the environments of the other frameworks in FOLDER/NAME. All do
+the same exchanges with one scripted server. A round measures each once, in alternating order, and
+only ratios within a round count: medians, with quartiles in brackets.
 """
 
 import json
@@ -21,17 +20,17 @@ HERE = Path(__file__).parent
 OURS = ("floor", "formup")
 PEERS = ("pydantic_ai", "openai_agents", "langgraph", "smolagents")
 MUCH_LESS = 4.0
-"""Times less processor time than every other framework, one conversation after the other."""
+"""Target: other frameworks take this multiple of formup's CPU time, one conversation at a time."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is measured: conversations of so many turns, and what formup must keep to.
+    """A measurement: conversations of a number of turns, and formup's target.
 
     Attributes:
-        most: times the processor time of the floor.
-        every: the others, which are slow, take part in one round of so many; odd, so that the
-            order alternates for them as well.
+        most: target of formup's CPU time, as a multiple of the floor's.
+        every: the other frameworks, which are slow, take part in one round of this many; odd,
+            so that the order alternates for them as well.
     """
 
     title: str
@@ -44,7 +43,7 @@ class Case:
 
     @property
     def few(self) -> int:
-        """Conversations that will do where they are slow, or only counted."""
+        """Conversations that suffice for slow frameworks, or to count requests."""
         return self.runs if self.at_once else 1
 
 
@@ -73,7 +72,7 @@ class Worker:
         self._read()
 
     def cpu(self, case: Case, runs: int) -> float:
-        """Seconds of processor time per turn."""
+        """Hold conversations and return CPU seconds per turn."""
         command = {
             "url": f"{self._base}/t{case.turns - 1}{self._final}/v1",
             "runs": runs,
@@ -98,7 +97,7 @@ class Worker:
 
 @contextmanager
 def started(python: Path, *arguments: str) -> Generator[int]:
-    """The scripted server; its port."""
+    """Start the scripted server and yield its port."""
     command = [python, *arguments]
     with subprocess.Popen(command, cwd=HERE, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
@@ -109,7 +108,7 @@ def started(python: Path, *arguments: str) -> Generator[int]:
 
 
 def check(worker: Worker, name: str, port: int) -> None:
-    """Refuse to compare what does not do the same exchanges."""
+    """Check that a worker does the same exchanges as all others; exit if not."""
     for case in CASES:
         before = _counts(port)
         worker.cpu(case, case.few)
@@ -158,7 +157,7 @@ def _counts(port: int) -> dict[str, int]:
 
 
 def _ratio(ours: dict[int, float], theirs: dict[int, float]) -> tuple[float, float, float]:
-    """Quartiles of the ratio, round by round."""
+    """Return the quartiles of the ratios within rounds."""
     ratios = [seconds / theirs[number] for number, seconds in ours.items()]
     low, middle, high = statistics.quantiles(ratios, n=4)
     return low, middle, high
@@ -174,7 +173,7 @@ def _verdict(met: bool, target: str) -> str:
 
 
 def main() -> None:
-    """Compare all there is."""
+    """Run all comparisons."""
     rounds, folder = int(sys.argv[1]), Path(sys.argv[2]).absolute()
     if rounds < 2:
         raise SystemExit(f"{rounds} rounds have no quartiles: ROUNDS must be 2 or more.")

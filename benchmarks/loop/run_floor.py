@@ -26,12 +26,12 @@ def _client() -> httpx.AsyncClient:
 
 
 async def run(base_url: str) -> str:
-    """A conversation."""
+    """Hold a conversation and return its final text."""
     return await _converse(base_url + "/chat/completions", _whole)
 
 
 async def run_stream(base_url: str) -> str:
-    """A conversation, streamed."""
+    """Hold a conversation, streamed, and return its final text."""
     return await _converse(base_url + "/chat/completions", _streamed)
 
 

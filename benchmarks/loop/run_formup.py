@@ -29,7 +29,7 @@ async def check_points(context: Context, points: list[Point]) -> ToolResult:
 
 
 def _nowhere(text: str | None) -> None:
-    """Streamed text is asked for, and not looked at."""
+    """Ignore streamed text, which is asked for only so that replies stream."""
 
 
 def _model(base_url: str, streams: bool) -> Model:
@@ -48,10 +48,10 @@ async def _converse_once(model: Model) -> str:
 
 
 async def run(base_url: str) -> str:
-    """A conversation."""
+    """Hold a conversation and return its final text."""
     return await _converse_once(_model(base_url, False))
 
 
 async def run_stream(base_url: str) -> str:
-    """A conversation, streamed."""
+    """Hold a conversation, streamed, and return its final text."""
     return await _converse_once(_model(base_url, True))

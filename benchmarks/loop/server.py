@@ -1,6 +1,6 @@
-"""A scripted Chat Completions server on loopback, its answers made beforehand.
+"""A scripted Chat Completions server on loopback with cached answers.
 
-POST /tN[f]/v1/chat/completions asks for N tool turns, then gives the final text (with f, as a call
+POST /tN[f]/v1/chat/completions answers with N tool turns, then the final text (with f, as a call
 of final_answer, which smolagents wants). The turn is the number of tool results in the request.
 Streams have an event for every four characters of arguments, each in a chunk of its own.
 """
@@ -18,19 +18,19 @@ USAGE = {"prompt_tokens": 321, "completion_tokens": 120, "total_tokens": 441}
 HEAD: dict[str, Any] = {"id": "chatcmpl-bench", "created": 1_760_000_000, "model": "bench-model"}
 RESULT = re.compile(
     rb'"role": ?"tool"|": ?"Observation:\\n'
-)  # smolagents tells results as users do
+)  # smolagents sends results as user messages
 STREAM = re.compile(rb'"stream": ?true')
 LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)", re.IGNORECASE)
 PATH = re.compile(rb"POST /t(\d+)(f?)/v1/chat/completions ")
 
 
 def dumps(value: object) -> str:
-    """Compact JSON."""
+    """Return compact JSON."""
     return json.dumps(value, separators=(",", ":"))
 
 
 def call(turn: int, last: bool) -> dict[str, Any]:
-    """The tool call of a turn; points are named after it, for models seldom repeat themselves."""
+    """Return the tool call of a turn; points are named after it, as models seldom repeat."""
     points = [{"label": f"p{i}-{turn}", "x": x, "y": y} for i, (x, y) in enumerate(POINTS)]
     name, arguments = (
         ("final_answer", {"answer": FINAL}) if last else ("check_points", {"points": points})
@@ -40,7 +40,7 @@ def call(turn: int, last: bool) -> dict[str, Any]:
 
 
 def whole(turn: int, kind: str) -> bytes:
-    """An answer in one piece."""
+    """Return an answer in one piece."""
     message: dict[str, Any] = {"role": "assistant", "content": None, "refusal": None}
     if kind == "text":
         message["content"] = FINAL
@@ -54,7 +54,7 @@ def whole(turn: int, kind: str) -> bytes:
 
 
 def streamed(turn: int, kind: str) -> bytes:
-    """An answer as server-sent events."""
+    """Return an answer as server-sent events."""
     deltas: list[dict[str, Any]] = [{"role": "assistant", "content": ""}]
     if kind == "text":
         deltas += [{"content": FINAL[i : i + 4]} for i in range(0, len(FINAL), 4)]
@@ -85,22 +85,22 @@ def streamed(turn: int, kind: str) -> bytes:
 
 @cache
 def answer(stream: bool, turn: int, kind: str) -> bytes:
-    """Made once."""
+    """Return an answer, made once and cached."""
     return (streamed if stream else whole)(turn, kind)
 
 
 class Conversation(asyncio.Protocol):
-    """One connection; `counts` is of all of them."""
+    """One connection; `counts` covers all of them."""
 
     counts: dict[str, int] = {"requests": 0, "bad": 0}  # noqa: RUF012
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Take a client."""
+        """Accept a client."""
         assert isinstance(transport, asyncio.Transport)
         self._transport, self._buffer = transport, b""
 
     def data_received(self, data: bytes) -> None:
-        """Answer what is complete."""
+        """Answer every complete request."""
         self._buffer += data
         while (end := self._buffer.find(b"\r\n\r\n")) >= 0:
             length = LENGTH.search(self._buffer, 0, end + 2)
@@ -125,7 +125,7 @@ class Conversation(asyncio.Protocol):
 
 
 async def serve() -> None:
-    """Print the port and serve until the end."""
+    """Print the port and serve until killed."""
     server = await asyncio.get_running_loop().create_server(
         Conversation, "127.0.0.1", 0, backlog=256
     )

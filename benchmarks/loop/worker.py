@@ -1,4 +1,4 @@
-"""Runs one framework in its own environment, at the word of `compare.py`: JSON lines in and out."""
+"""Runs one framework in its own environment for `run.py`, with JSON lines in and out."""
 
 import asyncio
 import importlib
@@ -14,12 +14,12 @@ from exchange import FINAL
 
 
 def cpu() -> float:
-    """Seconds of processor time this process has used, in the kernel too."""
+    """Return the CPU seconds this process has used, in the kernel too."""
     return time.process_time()
 
 
 async def measured(module: Any, command: dict[str, Any]) -> dict[str, Any]:
-    """Processor time of `runs` conversations, one after the other or all at once."""
+    """Return the CPU time of `runs` conversations, one after the other or all at once."""
     run = module.run_stream if command["stream"] else module.run
 
     async def one() -> None:
@@ -36,7 +36,7 @@ async def measured(module: Any, command: dict[str, Any]) -> dict[str, Any]:
 
 
 async def main(name: str, out: Any) -> None:
-    """Obey until the end of the input."""
+    """Carry out commands until the end of the input."""
     module = importlib.import_module(name)
     out.write('"ready"\n')
     loop = asyncio.get_running_loop()

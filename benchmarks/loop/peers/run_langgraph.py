@@ -1,4 +1,4 @@
-"""langgraph: langchain's create_agent with one tool over Chat Completions, its tracing off."""
+"""langgraph: langchain's create_agent with one tool over Chat Completions, without tracing."""
 
 import os
 from functools import cache
@@ -32,13 +32,13 @@ def _asked() -> dict[str, Any]:
 
 
 async def run(base_url: str) -> str:
-    """A conversation."""
+    """Hold a conversation and return its final text."""
     result = await _langgraph_agent(base_url, False).ainvoke(_asked(), DEEP)
     return result["messages"][-1].content
 
 
 async def run_stream(base_url: str) -> str:
-    """A conversation, streamed; the text is that of the last message's fragments."""
+    """Hold a conversation, streamed, and return the joined fragments of its last message."""
     texts: dict[str, str] = {}
     stream = _langgraph_agent(base_url, True).astream(_asked(), DEEP, stream_mode="messages")
     async for message, _ in stream:

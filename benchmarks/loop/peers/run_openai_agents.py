@@ -1,4 +1,4 @@
-"""openai-agents: Runner with one function tool over Chat Completions, its tracing off."""
+"""openai-agents: Runner with one function tool over Chat Completions, without tracing."""
 
 from functools import cache
 
@@ -25,12 +25,12 @@ def _openai_agent(base_url: str) -> Agent:
 
 
 async def run(base_url: str) -> str:
-    """A conversation."""
+    """Hold a conversation and return its final text."""
     return (await Runner.run(_openai_agent(base_url), USER, max_turns=1000)).final_output
 
 
 async def run_stream(base_url: str) -> str:
-    """A conversation, streamed."""
+    """Hold a conversation, streamed, and return its final text."""
     result = Runner.run_streamed(_openai_agent(base_url), USER, max_turns=1000)
     async for _ in result.stream_events():
         pass

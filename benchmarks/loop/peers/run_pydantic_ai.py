@@ -19,11 +19,11 @@ def _pydantic_agent(base_url: str) -> Agent:
 
 
 async def run(base_url: str) -> str:
-    """A conversation."""
+    """Hold a conversation and return its final text."""
     return (await _pydantic_agent(base_url).run(USER, usage_limits=UNLIMITED)).output
 
 
 async def run_stream(base_url: str) -> str:
-    """A conversation, streamed."""
+    """Hold a conversation, streamed, and return its final text."""
     async with _pydantic_agent(base_url).run_stream(USER, usage_limits=UNLIMITED) as result:
         return await result.get_output()

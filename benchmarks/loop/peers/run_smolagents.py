@@ -1,4 +1,4 @@
-"""smolagents: a ToolCallingAgent over Chat Completions; it has threads where others are async."""
+"""smolagents: a ToolCallingAgent over Chat Completions, run in threads, as it is not async."""
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +28,7 @@ def _model(base_url: str) -> OpenAIModel:
 
 
 def _smol_agent(base_url: str, streams: bool) -> ToolCallingAgent:
-    """An agent holds the memory of its run, so that each run has one; the model is shared."""
+    """Make an agent for one run, whose memory it holds; the model is shared."""
     agent = ToolCallingAgent(
         tools=[check_points],
         model=_model(base_url),
@@ -36,7 +36,7 @@ def _smol_agent(base_url: str, streams: bool) -> ToolCallingAgent:
         verbosity_level=LogLevel.OFF,
         stream_outputs=streams,
     )
-    agent.logger.console.quiet = True  # streamed text is drawn on the terminal otherwise
+    agent.logger.console.quiet = True  # otherwise streamed text goes to the terminal
     return agent
 
 
@@ -50,10 +50,10 @@ def _run_stream(base_url: str) -> str:
 
 
 async def run(base_url: str) -> str:
-    """A conversation."""
+    """Hold a conversation and return its final text."""
     return await asyncio.get_running_loop().run_in_executor(_pool, _smol_run, base_url)
 
 
 async def run_stream(base_url: str) -> str:
-    """A conversation, streamed."""
+    """Hold a conversation, streamed, and return its final text."""
     return await asyncio.get_running_loop().run_in_executor(_pool, _run_stream, base_url)

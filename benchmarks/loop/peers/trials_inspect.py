@@ -1,4 +1,4 @@
-"""Inspect AI: as many trials of a solver that asks no model, in an environment of its own."""
+"""Inspect AI: the same number of trials of a solver without a model, in its own environment."""
 
 import json
 import os
@@ -18,7 +18,7 @@ TASKS, TRIES = int(sys.argv[1]), int(sys.argv[2])
 
 @solver
 def coin():
-    """Heads or tails, without a model."""
+    """Toss a coin, without a model."""
 
     async def solve(state, generate):
         heads = random.Random(f"{state.sample_id} {state.epoch}").random() < 0.7
@@ -30,13 +30,13 @@ def coin():
 
 @task
 def coins():
-    """So many samples, each tried so often."""
+    """Return a task of `TASKS` samples, each tried `TRIES` times."""
     samples = [Sample(input="toss", target="heads", id=f"task-{n:03d}") for n in range(TASKS)]
     return Task(dataset=MemoryDataset(samples), solver=coin(), scorer=match(), epochs=TRIES)
 
 
 def measured(name, **options):
-    """CPU and wall seconds of one run."""
+    """Return the name, CPU seconds and wall seconds of one run."""
     with tempfile.TemporaryDirectory() as folder:
         cpu, wall = time.process_time(), time.perf_counter()
         (log,) = eval(coins(), model="mockllm/model", log_dir=folder, display="none", **options)
