@@ -6,7 +6,6 @@ instruction is left to the planner.
 
 import json
 import math
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -17,34 +16,13 @@ from .answering import arrived, said_of_edit, said_of_heading, said_of_query, sa
 from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup import Followup
+from .followup_answers import words_meant
 from .followup_things import UNNAMED, pointing_at
 from .followups import commands, read_followup
 from .pointed import heeded, shown_now
 from .sharing import shared
 from .standing import Standing
 
-DEICTIC = re.compile(
-    r"\b(?:(?:that|this|the|a|an)(?: one| other)? (?:robot|bot|drone|rover)|"
-    r"(?:one|some|most|several|a few|a couple) of (?:the robots|them)|"
-    r"over there|there|this one|that one|the other one|that|this)\b",
-    re.IGNORECASE,
-)
-ROBOT = re.compile(
-    r"^(?!some|most|several|a few|a couple).*(?:bot|drone|rover|them)", re.IGNORECASE
-)
-BESIDES = re.compile(
-    r"^\W*(?:(?:sorry|oh|ah|well|um|uh|i mean(?:t)?|that would be|"
-    r"that is|it'?s|let'?s say|say)\b[ ,.]*)+"
-    r"|[ ,.]+(?:i mean(?:t)?|sorry|please|then|i think|i guess|of course)(?=\W*$)",
-    re.IGNORECASE,
-)
-"""What stands before or after an answer."""
-ALTERNATIVES = re.compile(
-    r"\b(?:robots? |number )?(t?[0-9]+) or (?:robot |number )?t?[0-9]+\b", re.IGNORECASE
-)
-"""One of which an answer chooses: "robot 3 or 4"."""
-LEADING = re.compile(r"\W*(?:(?:robot|number|nr|no)\.? )*(t?[0-9]+)\b[ ,.:]*(.*)", re.IGNORECASE)
-"""The number that an answer begins with, and the rest of it."""
 FEW = 3
 """Robots of which it is measured exactly which is the nearest."""
 LEAST_WAY = 0.02
@@ -68,7 +46,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
             return _calling("ask_user", {"question": _question(followup), **offered})
         if declines(answer):
             return Reply(text="Nothing was changed.")
-        words = _words_meant(words, followup, answer, standing)
+        words = words_meant(words, followup, answer, standing)
         followup = read_followup(words, standing)
     followup = heeded(task, followup) if shown else followup
     if followup.kind == "instruction":
@@ -141,35 +119,6 @@ def _question(followup: Followup) -> str:
     return f"{followup.text} {'; '.join(options)}." if options else followup.text
 
 
-def _words_meant(words: str, followup: Followup, answer: str, standing: Standing | None) -> str:
-    """The words that an answer makes of what was asked about; a new command stands alone."""
-    number = re.fullmatch(r"\W*(?:option |number )?([0-9]+)\W*", answer.lower())
-    if number and 1 <= int(number[1]) <= len(followup.options):
-        return followup.options[int(number[1]) - 1]
-    if len(followup.options) == 1 and agrees(answer):
-        return followup.options[0]
-    if answer in followup.options or (standing and commands(answer, standing)):
-        return answer
-    answer = BESIDES.sub("", answer) or answer
-    said = set(re.findall(r"\w+", answer.lower()))
-    fitting = [option for option in followup.options if said <= {*option.lower().split()}]
-    if len(fitting) == 1:
-        return fitting[0]
-    joined: list[str] = []
-    lead, either = LEADING.match(answer), ALTERNATIVES.search(words)
-    shown = DEICTIC.search(words)
-    if lead and either:
-        joined = [f"{words[: either.start(1)]}{lead[1]}{words[either.end() :]} {lead[2]}"]
-    elif lead and shown and ROBOT.search(shown[0]):
-        joined = [f"{DEICTIC.sub(f'robot {lead[1]}', words, count=1)} {lead[2]}"]
-    elif shown:
-        joined = [DEICTIC.sub(answer, words, count=1)]
-    for attempt in (*joined, f"{words} {answer}", f"{answer} {words}"):
-        if read_followup(attempt, standing).kind not in ("ask", "refuse", "instruction"):
-            return attempt
-    return answer
-
-
 class _Steps:
     """What a follow-up takes, one call after another."""
 
@@ -220,7 +169,7 @@ class _Steps:
             return Reply(text=measured.text)
         if measured is not None:
             data = json.loads(measured.text)
-            if query["about"] == "nearest" and thing and thing not in standing.targets:
+            if query["about"] == "nearest" and thing and standing.targets != [thing]:
                 return self._nearest_to(thing, data, standing, query)
             return Reply(text=said_of_query(query, data, scale))
         two = len(robots) == 2 and "each" not in query

@@ -27,6 +27,9 @@ ALIKE = re.compile(r"\b(?:same|too|also|as well|likewise)\b", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 DIRECTED = re.compile(r"^\W*(?:\w+ )?(?:(?P<up>up)|down) to\b", re.IGNORECASE)
 """More or fewer than there are: "up to 9", "go down to five"."""
+BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
+SOME_OF = re.compile(r"\bof (?:them|these|those|the robots)\b.*\bback\b", re.IGNORECASE)
+"""After a number, it is one of robots that go somewhere, not of all there are to be."""
 LIKE_A_RING = ("around", "cage", "corners", "shape")
 """Arrangements about a thing, which "around" the next one keeps."""
 
@@ -130,6 +133,8 @@ def count(slots: Slots, said: Said) -> Effects:
     way = DIRECTED.search(said.words)
     if n is not None and way and n != said.count and (n > said.count) != bool(way["up"]):
         return ask(f"{n} of what?", f"{n} px away from it", f"make it {n} robots")
+    if "back" in slots and not BACK_TO.search(said.words):
+        return None
     if n is not None and n > MAX_ROBOTS:
         return refuse(f"{n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed.")
     if n == said.count:

@@ -14,11 +14,10 @@ from .followup_edits import (
     refuse,
 )
 from .followup_frames import Slots
-from .followup_teams import count
+from .followup_teams import BACK_TO, SOME_OF, count
 from .followup_things import known
 from .followup_words import chunks_of
 
-BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
 PUT_BACK = re.compile(r"\b(?:put|bring|add|give|take)\b.*\bback\b", re.IGNORECASE)
 STATED, WIDEST = 2.0, 0.11
 """Widest range of a distance that was stated: so many px, or this share of it."""
@@ -76,6 +75,8 @@ def _times(slots: Slots, said: Said) -> int:
 
 def undo(slots: Slots, said: Said) -> Effects:
     """So many steps back."""
+    if "num" in slots and SOME_OF.search(said.words):
+        return None
     steps, there = _times(slots, said), said.standing.changes
     if there < steps:
         why = (
@@ -95,6 +96,8 @@ def returned(slots: Slots, said: Said) -> Effects:
     gone = sum(e.get("n", len(e.get("ids", ()))) for e in said.last if e["kind"] == "remove")
     if not named and len(numbers) == 1 and numbers[0] < gone and PUT_BACK.search(said.words):
         return [{"kind": "add", "n": numbers[0]}]
+    if SOME_OF.search(said.words):
+        return None
     for steps, (relations, robots) in enumerate(said.standing.past, 1):
         fits = named <= {*relations} and numbers in ([], [robots])
         if fits and (steps == 1 or named or not numbers) and BACK_TO.search(said.words):
