@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from .barring import ENDS, MAY_BE, Barring
 from .demand_fields import LENGTHS, Fields
 from .demands import (
+    PURPOSES,
     Item,
     demands_in,
     items_of,
@@ -106,7 +107,10 @@ class _Reader:
         self.demands = tuple(
             d
             for d in demands_in(items)
-            if d.numbers or d.sides or not self.prevented.issuperset(range(d.first, d.last))
+            if d.numbers
+            or d.sides
+            or d.sets in PURPOSES
+            or not self.prevented.issuperset(range(d.first, d.last))
         )
         self.scenery = self._scenery()
 

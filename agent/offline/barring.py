@@ -39,7 +39,8 @@ class Barring:
             if self._items[k].label == "command" and not self._is_forbidden(k)
         )
         likely = dict(reading.meanings).get("cage", 0)
-        return self._prevents(demands) or (closing and likely >= MAY_BE)
+        escape = any(demand.sets == "closure" for demand in demands)
+        return escape or self._prevents(demands) or (closing and likely >= MAY_BE)
 
     def _prevented(self) -> frozenset[int]:
         """Items that say what must not happen: "so that nobody gets near it"."""

@@ -24,6 +24,8 @@ LEAST_BARE = 5
 """Numbers without a unit below this, px, are hardly lengths."""
 SEVERAL = re.compile(r"\b(?:two|three|four|five|six|both|pair|[a-z]+[^s\W]s)\b")
 """What a phrase for more than one thing has in it."""
+FAR_OFF = frozenset(("well", "far", "long", "plenty", "safe", "good"))
+"""Words of "stay well away from it" that say how far."""
 LENGTHS = ("clearance", "pitch", "min_spacing", "max_gap", "radius", "diameter", "opening")
 
 
@@ -159,8 +161,10 @@ class Fields(Portions):
 
     def _keep_out(self, demand: Demand) -> bool:
         other = self._other(demand)
-        if other is None:
-            return self.reading.relation in ("around", "cage", "along", "corners")
+        if other is None:  # of the thing itself, which they stand off anyway
+            far = FAR_OFF & {i.symbol for i in self.items[demand.first : demand.last]}
+            stands = self.reading.relation in ("around", "cage", "along", "corners")
+            return stands and (not far or self._set("fit", "wide"))
         self.reading.others.append(other)
         return True
 

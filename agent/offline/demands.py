@@ -19,6 +19,13 @@ from .tagging import Tagging, Token
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
 ALWAYS = ("a negation", "a cancellation", "something past", "another task", "a span of time")
 """Kinds of stops that also count in words that look like background beside an order."""
+PURPOSES = ("closure",)
+"""What is also demanded by what sounds like background: "so that it cannot get out"."""
+OF_ROBOTS = re.compile(
+    r"\b(?:so|such|way) (?:that )?(?:they|all|each|every|every(?:one|body)|(?:the )?robots)\b"
+    r"[^.;!?]*$"
+)
+"""Before a demand: a purpose that says how robots are to stand is no background."""
 SURE_SCENIC = 0.8
 """Least probability of each word of a sentence that only tells something."""
 TOLD_OF = ("nobody", "no", "none", "there", "we", "i", "they", "it", "it's", "there's")
@@ -116,8 +123,10 @@ def demands_in(items: Sequence[Item]) -> tuple[Demand, ...]:
         for pattern in rule.patterns:
             for match in pattern.finditer(line.text):
                 first, last = line.items_of(match)
-                counts = any(i.quantity or i.label != "background" for i in items[first:last])
-                if last > first and all(free[first:last]) and counts:
+                told = all(i.label == "background" and not i.quantity for i in items[first:last])
+                if rule.sets in PURPOSES or OF_ROBOTS.search(line.text[: match.start()]):
+                    told = False
+                if last > first and all(free[first:last]) and not told:
                     free[first:last] = [False] * (last - first)
                     found.append(_demand(rule, match, items, first, last, line))
     return tuple(found)

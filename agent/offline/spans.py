@@ -36,6 +36,10 @@ COUNTED = re.compile(
 )
 """What stands before a thing that is named last: "five to the lid", "the middle between"."""
 MIDDLE = re.compile("(?:the |its )(?:very |exact )?(?:centre|center|middle)")
+PURPOSE = frozenset(
+    (("such", "that"), ("so", "that"), ("so", "they"), ("so", "it"), ("such", "a"), ("in", "order"))
+)
+"""Two words that begin a purpose."""
 OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
 
 
@@ -56,7 +60,7 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
         found[start:headed], start = ["command"] * (headed - start), headed
         while end > start and words[end - 1] in _lists()["trailing"]:
             found[end - 1], end = "demand", end - 1
-        cut = _passive(words, start, end)
+        cut = min(_passive(words, start, end), _purpose(words, start, end))
         found[cut:end] = ["command"] * (end - cut)
         found[start:cut] = _thing_labels(words, start, cut) if cut > start else []
     for start, end in _runs(found, "demand"):
@@ -176,6 +180,12 @@ def _place(words: Sequence[str], start: int, end: int) -> list[str]:
     if words[start] in _lists()["leading"]:
         return ["command", *_place(words, start + 1, end)]
     return _thing_labels(words, start, end)
+
+
+def _purpose(words: Sequence[str], start: int, end: int) -> int:
+    """Where a purpose begins that is no part of the words for a thing: "such that they hug it"."""
+    pairs = (k for k in range(start + 1, end - 1) if (words[k], words[k + 1]) in PURPOSE)
+    return next(pairs, end)
 
 
 def _passive(words: Sequence[str], start: int, end: int) -> int:
