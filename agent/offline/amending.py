@@ -1,4 +1,4 @@
-"""An instruction in which the speaker takes something back, as what is meant in the end."""
+"""Resolves corrections and typing errors in an instruction to what is finally meant."""
 
 import re
 
@@ -24,7 +24,7 @@ RECOUNT = re.compile(
 
 
 def amended(words: str) -> str:
-    """The words with the number of robots that is said last: "9 robots, no wait, ten robots"."""
+    """Return the words with the robot count given last: "9 robots, no wait, ten robots"."""
     again = RECOUNT.search(words)
     first = COUNT.search(words)
     if again is None or first is None or again.start() < first.end():
@@ -34,7 +34,7 @@ def amended(words: str) -> str:
 
 
 def typed(words: str) -> str:
-    """An instruction, with slips of the fingers put right where it is understood then."""
+    """Return an instruction with corrections applied, and typos fixed if it is understood then."""
     words = amended(words)
     corrected = spelled(words)
     if corrected != words and read_instruction(words).unread:

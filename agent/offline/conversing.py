@@ -1,6 +1,6 @@
-"""The offline planner in a conversation: what is said to a plan, tool call by tool call.
+"""The offline planner in a conversation: carries out words about a plan, one tool call at a time.
 
-What was done already is read from the turn's messages, so nothing is kept here. A whole new
+What was done already is read from the turn's messages, so no state is stored here. A whole new
 instruction is left to the planner.
 """
 
@@ -38,21 +38,21 @@ BESIDES = re.compile(
     r"|[ ,.]+(?:i mean(?:t)?|sorry|please|then|i think|i guess|of course)(?=\W*$)",
     re.IGNORECASE,
 )
-"""What stands before or after an answer."""
+"""Words that come before or after an answer and say nothing."""
 ALTERNATIVES = re.compile(
     r"\b(?:robots? |number )?(t?[0-9]+) or (?:robot |number )?t?[0-9]+\b", re.IGNORECASE
 )
-"""One of which an answer chooses: "robot 3 or 4"."""
+"""Alternatives that an answer chooses from: "robot 3 or 4"."""
 LEADING = re.compile(r"\W*(?:(?:robot|number|nr|no)\.? )*(t?[0-9]+)\b[ ,.:]*(.*)", re.IGNORECASE)
 """The number that an answer begins with, and the rest of it."""
 FEW = 3
-"""Robots of which it is measured exactly which is the nearest."""
+"""Most robots whose exact distances are measured to find the nearest."""
 LEAST_WAY = 0.02
-"""Of the picture's shorter side: the least way that "a bit" is."""
+"""Shortest way that "a bit" is, as a share of the picture's shorter side."""
 
 
 def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
-    """The next step of a turn, or the task and messages of a whole new instruction."""
+    """Return the next step of a turn, or the task and messages of a whole new instruction."""
     shown = shown_now(task, before) if task.standing else ()
     task = replace(task, pointed=shown) if shown else task
     standing = _standing(task, before)
@@ -79,7 +79,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
 
 
 def _told(followup: Followup, reply: Reply) -> Reply:
-    """The reply, which says at the end of a turn what was read as background."""
+    """Return the reply; at the end of a turn it also quotes what was read as background."""
     if reply.calls or not followup.background:
         return reply
     quoted = ", ".join(f'"{words}"' for words in followup.background)
@@ -88,7 +88,7 @@ def _told(followup: Followup, reply: Reply) -> Reply:
 
 
 def _standing(task: Task, before: History) -> Standing | None:
-    """The plan that stands, with what this turn points at."""
+    """Return the current plan with what this turn points at; None if there is no plan."""
     if task.standing is None:
         return None
     pointed = tuple(str(p["id"]) for p in task.pointed)
@@ -104,7 +104,7 @@ def _standing(task: Task, before: History) -> Standing | None:
     )
     facts = task.standing
     last: dict[str, Any] = facts.get("last") or {}
-    if said and last.get("words") == begun:  # what was answered to what was asked about them
+    if said and last.get("words") == begun:  # an answer to a question about those words
         facts = facts | {"last": {**last, "words": said[-1]}}
     return Standing.of(
         facts,
@@ -117,7 +117,7 @@ def _standing(task: Task, before: History) -> Standing | None:
 
 
 def _answer_to(messages: History) -> tuple[str | None, History]:
-    """The person's answer to the first question in words, and the messages after it."""
+    """Return the person's first answer to a question, or None, and the messages after it."""
     for k, message in enumerate(messages):
         if isinstance(message, Result) and message.name == "ask_user" and not message.error:
             return message.text, messages[k + 1 :]
@@ -125,7 +125,7 @@ def _answer_to(messages: History) -> tuple[str | None, History]:
 
 
 def _goes_on(messages: History, standing: Standing | None) -> bool:
-    """Whether an answer to which thing is meant chooses none, and is a command of its own."""
+    """Return whether an answer to "which thing?" chooses none and is a command of its own."""
     answer, later = _answer_to(messages)
     until = messages[: len(messages) - len(later)]
     asked = [c for c in calls_in(until) if c.name == "ask_user"]
@@ -136,13 +136,13 @@ def _goes_on(messages: History, standing: Standing | None) -> bool:
 
 
 def _question(followup: Followup) -> str:
-    """The question with its options numbered."""
+    """Return the question with its options numbered."""
     options = [f"{k}: {option}" for k, option in enumerate(followup.options, 1)]
     return f"{followup.text} {'; '.join(options)}." if options else followup.text
 
 
 def _words_meant(words: str, followup: Followup, answer: str, standing: Standing | None) -> str:
-    """The words that an answer makes of what was asked about; a new command stands alone."""
+    """Return the words with an answer put in, or the answer alone if it is a command."""
     number = re.fullmatch(r"\W*(?:option |number )?([0-9]+)\W*", answer.lower())
     if number and 1 <= int(number[1]) <= len(followup.options):
         return followup.options[int(number[1]) - 1]
@@ -171,7 +171,7 @@ def _words_meant(words: str, followup: Followup, answer: str, standing: Standing
 
 
 class _Steps:
-    """What a follow-up takes, one call after another."""
+    """The steps that a follow-up takes, one call after another."""
 
     def __init__(
         self,
@@ -186,7 +186,7 @@ class _Steps:
         self.done = {m.name: m for m in messages if isinstance(m, Result)}
 
     def next(self) -> Reply:
-        """The next call, or the words that end the turn."""
+        """Return the next call, or the text that ends the turn."""
         followup, standing = self.followup, self.standing
         if followup.kind == "refuse":
             return Reply(text=followup.text)
@@ -203,7 +203,7 @@ class _Steps:
         return self._change(standing)
 
     def _query(self, standing: Standing) -> Reply:
-        """Measure what is asked, then say it."""
+        """Measure what the question is about, then answer it."""
         query: dict[str, Any] = dict(self.followup.query or {})
         results = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"]
         if query["about"] == "heading":
@@ -235,7 +235,7 @@ class _Steps:
     def _nearest_to(
         self, thing: str, data: dict[str, Any], standing: Standing, query: dict[str, Any]
     ) -> Reply:
-        """Of the few whose places are nearest to another thing's centre the one that is."""
+        """Measure the few robots nearest to (or furthest from) another thing, then answer."""
         centre, sign = (standing.centre or {})[thing], -1 if query["most"] == "furthest" else 1
         rows = sorted(data["each"], key=lambda r: sign * math.dist(r["place"], centre))[:FEW]
         measured = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"][1:]
@@ -246,7 +246,7 @@ class _Steps:
         return Reply(text=said_of_query(query, {"each": seen}, self.task.metres_per_pixel))
 
     def _change(self, standing: Standing) -> Reply:
-        """Take back, find things, measure, edit; then move where asked, and say what came."""
+        """Find things, take back, measure and edit; then move robots if asked, and report."""
         followup, failed = self.followup, self.done.get("edit_formation")
         ids: dict[str, str] = {}
         prompts: list[dict[str, Any]] = []
@@ -311,13 +311,13 @@ class _Steps:
         return _calling("edit_formation", arguments)
 
     def _stands_there(self, edit: dict[str, Any]) -> bool:
-        """Whether an edit moves all robots to the thing they stand about."""
+        """Return whether an edit moves all robots to the thing they stand about already."""
         assert self.standing is not None
         alone = len(self.standing.groups) == 1 and "robots" not in edit
         return alone and edit["kind"] == "target" and [edit["to"]] == self.standing.targets
 
     def _failed(self, failed: Result, *, taken_back: bool) -> Reply:
-        """Nothing is changed: what was taken back for it is made again."""
+        """Report or ask why nothing is changed, after redoing what was taken back for the edit."""
         undos = sum(isinstance(m, Result) and m.name == "undo" for m in self.messages)
         found = shared(failed, self.messages) if failed.cause == "no_order" else ""
         if isinstance(found, Step):
@@ -350,7 +350,7 @@ class _Steps:
         return Reply(text=f"{told} Nothing was moved.")
 
     def _later(self, answer: str, told: str) -> Reply:
-        """The second step of a sequence, once it is confirmed; or what is said instead of it."""
+        """Take the second step of a sequence once it is confirmed, or what is said instead."""
         assert self.standing is not None
         confirmed = agrees(answer) or answer.strip(" .") == "1"
         if declines(answer) or answer.strip(" .") == "2":
@@ -379,7 +379,7 @@ class _Steps:
 
 
 def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
-    """One robot's way out from its target, or in, as a way in x and y."""
+    """Return an edit with a robot's way out from its target, or in, turned into x and y, px."""
     if not isinstance(edit.get("by"), dict):
         return edit
     by: dict[str, float] = edit["by"]

@@ -1,4 +1,4 @@
-"""From a frame to edits that follow from the last ones: more of it, less, the other way, not so."""
+"""Edits that follow from the last ones: more of it, less, the other way, not so far."""
 
 import re
 from collections.abc import Sequence
@@ -24,13 +24,13 @@ RELATIVE = (
     *("out", "in", "rotate", "shift", "scale", "spacing", "place", "add", "remove"),
     *("mirror", "swap"),
 )
-"""Kinds that are done again on top of themselves."""
+"""Kinds of edits that can be repeated, each on top of the one before."""
 FURTHER = re.compile(r"\b(?:further|farther)(?: please)?\W*$", re.IGNORECASE)
-"""Without a word for where to, it is on in the direction of the last move."""
+"""Without a direction, this goes on in that of the last move."""
 
 
 def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
-    """The last edits of one of these kinds: of robots that moved one by one, all that did."""
+    """Return the last edit of one of these kinds; if robots moved one by one, all those edits."""
     edits = [dict(e) for e in said.last]
     while edits and edits[-1]["kind"] not in kinds:
         edits.pop()
@@ -39,7 +39,7 @@ def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
 
 
 def further_on(slots: Slots, said: Said) -> Effects:
-    """ "A bit further", after a robot was moved or all were turned: on in that direction."""
+    """Read "a bit further" after a robot was moved or all were turned: on in that direction."""
     kinds = {e["kind"] for e in _latest(said)}
     slots.has("radial", "again")
     if not kinds or kinds - {"place", "rotate"}:
@@ -48,7 +48,7 @@ def further_on(slots: Slots, said: Said) -> Effects:
 
 
 def again(slots: Slots, said: Said) -> Effects:
-    """The last change once more; what was taken back, made again."""
+    """Repeat the last change, or redo what was just taken back."""
     if said.standing.redo and not said.before and not said.last:
         return [{"kind": "undo", "steps": -1}]
     edits = [e for e in said.last if e["kind"] in RELATIVE and "to" not in e]
@@ -56,7 +56,7 @@ def again(slots: Slots, said: Said) -> Effects:
 
 
 def more(slots: Slots, said: Said) -> Effects:
-    """More of the last change; without an amount as much again."""
+    """Do more of the last change; without an amount, as much again."""
     last = _latest(said, (*RELATIVE, "opening", "distance"))
     if not last:
         return ask("More of what?", "a bit further out", "a bit closer", "one more robot")
@@ -66,7 +66,7 @@ def more(slots: Slots, said: Said) -> Effects:
 
 
 def more_of(slots: Slots, said: Said) -> Effects:
-    """More of the last change, for some of the robots it was about."""
+    """Do more of the last change for some of the robots it was about."""
     named = {r for robots in slots["robots"] for r in robots}
     slots.has("make", "move")
     placed = [e for e in _latest(said) if e.get("robot") in named]
@@ -110,7 +110,7 @@ def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
 
 
 def _further(last: Effect, way: float | None) -> Effect | None:
-    """As far again in the direction of a move, or so far."""
+    """Return a move in the direction of the last one, as far again or `way` px far."""
     if way is None:
         return last
     by: Any = last.get("by")
@@ -125,7 +125,7 @@ def _further(last: Effect, way: float | None) -> Effect | None:
 
 
 def less_by(slots: Slots, said: Said) -> Effects:
-    """So many px less: of the distance, unless the last change was of something else."""
+    """Reduce the distance by px; None if the last change was of something else."""
     distances = ("distance", "out", "in")
     if said.last and said.last[-1]["kind"] not in distances:
         return None
@@ -133,7 +133,7 @@ def less_by(slots: Slots, said: Said) -> Effects:
 
 
 def less(slots: Slots, said: Said) -> Effects:
-    """Half of the last change taken back, however it is said."""
+    """Take back half of the last change, whatever amount is given."""
     slots.has("much", "ratio", "back")
     last = _latest(said, (*RELATIVE, "opening"))
     halved = [half for edit in last if (half := _scaled(edit, -0.5)) is not None]
@@ -143,7 +143,7 @@ def less(slots: Slots, said: Said) -> Effects:
 
 
 def _scaled(edit: Effect, share: float) -> Effect | None:
-    """An edit that does a share of another; a negative one takes so much of it back."""
+    """Return an edit that does a share of another; a negative share takes so much of it back."""
     kind = edit["kind"]
     if kind in ("out", "in", "scale", "spacing", "opening"):
         back = {"out": "in", "in": "out"}.get(kind, kind)
@@ -176,7 +176,7 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
 
 
 def otherway(slots: Slots, said: Said) -> Effects:
-    """The last change the other way; with an amount, so much of it back."""
+    """Make the last change the other way; with "a bit" or the like, take half of it back."""
     turning = (*RELATIVE, "opening", "sides", "heading")
     last = _latest(said, turning)
     if not last:
@@ -190,7 +190,7 @@ def otherway(slots: Slots, said: Said) -> Effects:
 
 
 def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
-    """Edits in the place of the last ones: those are taken back first, as part of one change."""
+    """Return edits that replace the last ones: those are taken back first, within one change."""
     back = [inverse(e) for e in reversed(last)]
     found = [e for e in back if e is not None]
     if len(found) < len(back):
@@ -203,7 +203,7 @@ def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
 
 
 def _merged(first: Effect, then: Effect) -> list[Effect]:
-    """Two edits as one where they are of one kind."""
+    """Return two edits as one if they are of one kind and of the same robot, else both."""
     if first["kind"] != then["kind"] or first.get("robot") != then.get("robot"):
         return [first, then]
     if "factor" in first and "factor" in then:
@@ -218,7 +218,7 @@ def _merged(first: Effect, then: Effect) -> list[Effect]:
 
 
 def inverse(edit: Effect) -> Effect | None:
-    """The edit that takes another back; None where there is none."""
+    """Return the edit that takes another back; None where there is none."""
     if edit["kind"] in ("mirror", "swap"):
         return edit
     if edit["kind"] in ("add", "remove"):
@@ -228,7 +228,7 @@ def inverse(edit: Effect) -> Effect | None:
 
 
 def _turned(edit: Effect) -> Effect | None:
-    """An edit the other way round."""
+    """Return the edit in the opposite sense; None where there is none."""
     kind = edit["kind"]
     if kind in ("out", "in"):
         return edit | {"kind": {"out": "in", "in": "out"}[kind]}
@@ -248,7 +248,7 @@ def _turned(edit: Effect) -> Effect | None:
 
 
 def toofar(slots: Slots, said: Said) -> Effects:
-    """Too far, too close: half of the last change back, where it went there; else a bit."""
+    """Take half of the last change back if it led to "too far" or "too close", else move a bit."""
     if "dir" in slots:
         back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]
         return shift(Slots({"dir": [back], "much": ["bit"]}), said)

@@ -1,4 +1,4 @@
-"""From a frame to what a turn does beside edits, and to edits that follow from the last ones."""
+"""What a turn does beside edits (undo, go, questions), and edits that need the last ones."""
 
 import re
 
@@ -21,11 +21,11 @@ from .followup_words import chunks_of
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
 PUT_BACK = re.compile(r"\b(?:put|bring|add|give|take)\b.*\bback\b", re.IGNORECASE)
 STATED, WIDEST = 2.0, 0.11
-"""Widest range of a distance that was stated: so many px, or this share of it."""
+"""Widest range of a clearance set by a stated distance: px, or a share of the distance."""
 CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
-"""What says that something is chosen: "six then", "7, not 5"."""
+"""Words that mark a choice: "six then", "7, not 5"."""
 STATED_BY = ("distance", "spacing", "opening")
-"""Kinds of edits by a length that is meant exactly."""
+"""Kinds of edits by an exact length."""
 STEPS = re.compile(r"\b(?:steps?|changes?|edits?|times|plans?|moves)\b", re.IGNORECASE)
 CALLED = {
     "swap": ("swap",),
@@ -42,7 +42,7 @@ CALLED = {
     "face": ("heading",),
     "dir": ("shift", "place"),
 }
-"""What changes are called, by the kinds of phrases that say it, and of which kinds they are."""
+"""Kinds of phrases that name a change, and the kinds of edits that they may mean."""
 OF_THEM = re.compile(r"\bof them\b|\b(?:robots|bots|drones|units)\b", re.IGNORECASE)
 METRES = re.compile(r"\bmet(?:re|er)s?\b", re.IGNORECASE)
 AT_LEAST = re.compile(
@@ -66,7 +66,7 @@ MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
 def _times(slots: Slots, said: Said) -> int:
-    """How many steps: as many as are said, or as often as it is said: "undo, undo"."""
+    """Return the number of steps, as given or as often as it is repeated: "undo, undo"."""
     if "num" in slots or "twice" in slots:
         return int(slots.get("num", slots.get("twice", [1]))[0])
     parts = re.split(r"[,;.!]|\band\b|\bthen\b", said.words.lower())
@@ -75,7 +75,7 @@ def _times(slots: Slots, said: Said) -> int:
 
 
 def undo(slots: Slots, said: Said) -> Effects:
-    """So many steps back."""
+    """Go a number of steps back."""
     steps, there = _times(slots, said), said.standing.changes
     if there < steps:
         why = (
@@ -88,7 +88,7 @@ def undo(slots: Slots, said: Said) -> Effects:
 
 
 def returned(slots: Slots, said: Said) -> Effects:
-    """Back to the last plan with an arrangement or a number of robots: "back to the circle"."""
+    """Go back to the last plan with an arrangement or number of robots: "back to the circle"."""
     named = {"around" if r == "circle" else r for r in slots.get("relation", ())}
     numbers = [int(n) for n in (*slots.get("num", ()), *(1 for _ in slots.get("lone", ())))]
     slots.has("undo", "back", "first", "again")
@@ -108,14 +108,14 @@ def returned(slots: Slots, said: Said) -> Effects:
 
 
 def put_back(slots: Slots, said: Said) -> Effects:
-    """Robots as they stood before the last change, which was about them too."""
+    """Put robots back to where they were before the last change, if that moved them too."""
     named = {r for row in slots["robots"] for r in row}
     moved = {e.get("robot") for e in said.standing.edits}
     return stay(slots, said) if {None, *named} & moved else None
 
 
 def undone(slots: Slots, said: Said) -> Effects:
-    """The last change taken back, where it is called by what it was: "undo the swap"."""
+    """Take back the last change if it is named by its kind ("undo the swap"), else ask."""
     names = {e for name in CALLED for e in CALLED[name] if name in slots}
     last = [str(e["kind"]) for e in said.standing.edits]
     if {*last} & names:
@@ -125,7 +125,7 @@ def undone(slots: Slots, said: Said) -> Effects:
 
 
 def kept(slots: Slots, said: Said) -> Effects:
-    """What stays as it is beside a change: the spacing, by a demand of its own."""
+    """Keep a quantity as it is beside a change; in a row the spacing takes an edit of its own."""
     of = str(slots["quantity"][0])
     if re.search(r"\b(?:keep\w*|same|leave|stays?|unchanged)\b", said.words, re.IGNORECASE) is None:
         return None
@@ -136,14 +136,14 @@ def kept(slots: Slots, said: Said) -> Effects:
 
 
 def moved_back(slots: Slots, said: Said) -> Effects:
-    """A robot where it was before the last change, if that was about no other."""
+    """Put robots back to where they were before the last change, if that moved only them."""
     robots = {r for named in slots["robots"] for r in named}
     moved = {e.get("robot") for e in said.last}
     return undo(Slots(), said) if said.last and moved == robots and not said.before else None
 
 
 def unadded(slots: Slots, said: Said) -> Effects:
-    """Those that were added last leave again."""
+    """Take back the robots that were added last."""
     slots.used.update(slots)
     counts = [e for e in said.last if e["kind"] in ("add", "count")]
     named = re.search(r"\b(?:those|them|these|they)\b", said.words, re.IGNORECASE)
@@ -152,13 +152,13 @@ def unadded(slots: Slots, said: Said) -> Effects:
 
 
 def dont(slots: Slots, said: Said) -> Effects:
-    """ "No, don't: like before"; "don't undo" is another matter."""
+    """Undo after "no, don't: like before", but not after "don't undo"."""
     called_off = re.match(r"\W*(?:don'?t|do not)\W*[,.;:!-]", said.words, re.IGNORECASE)
     return undo(slots, said) if called_off else None
 
 
 def redo(slots: Slots, said: Said) -> Effects:
-    """So many steps forward again."""
+    """Go a number of steps forward again."""
     steps = _times(slots, said)
     if said.standing.redo < steps and said.words.lower().split()[:2] == ["undo", "undo"]:
         return undo(Slots(num=[2]), said)
@@ -168,14 +168,14 @@ def redo(slots: Slots, said: Said) -> Effects:
 
 
 def first(slots: Slots, said: Said) -> Effects:
-    """The first plan."""
+    """Go back to the first plan."""
     if not said.standing.steps:
         return refuse("No plan stands yet, so there is no first one to go back to.")
     return [{"kind": "undo", "to": "first"}]
 
 
 def restart(slots: Slots, said: Said) -> Effects:
-    """All over again: what is to be done is asked."""
+    """Start over: ask what is to be done."""
     return ask(
         "Starting over: which thing, which arrangement and how many robots?",
         "back to the first one",
@@ -183,37 +183,37 @@ def restart(slots: Slots, said: Said) -> Effects:
 
 
 def go(slots: Slots, said: Said) -> Effects:
-    """The robots move."""
+    """Let the robots move."""
     return [{"kind": "go"}]
 
 
 def hold(slots: Slots, said: Said) -> Effects:
-    """Nothing moves until go; robots that are named stay."""
+    """Let nothing move until "go"; if robots are named, keep only those where they are."""
     return stay(slots, said) if "robots" in slots else [{"kind": "hold"}]
 
 
 def stay(slots: Slots, said: Said) -> Effects:
-    """Robots that are named stay where they are."""
+    """Keep the robots named where they are."""
     return [{"kind": "stay", "robots": [r for named in slots["robots"] for r in named]}]
 
 
 def rest_stays(slots: Slots, said: Said) -> Effects:
-    """All but those named before stay where they are."""
+    """Keep all but the robots named before where they are."""
     return [{"kind": "rest"}]
 
 
 def keep(slots: Slots, said: Said) -> Effects:
-    """It stays as it is."""
+    """Change nothing, and report that it is so already."""
     return [{"kind": "talk", "about": "already"}]
 
 
 def steps(slots: Slots, said: Said) -> Effects:
-    """How many steps can be taken back."""
+    """Report how many steps can be taken back."""
     return [{"kind": "talk", "about": "steps"}]
 
 
 def bare(slots: Slots, said: Said) -> Effects:
-    """An amount alone: what it is of is asked."""
+    """Read an amount alone: a length or count if the last words tell which, else ask."""
     last = said.last[-1] if len(said.last) == 1 else {}
     exact = "px" in last and last["kind"] in STATED_BY
     if "px" in slots and exact and (said.denies or CHOSEN.search(said.line)):
@@ -235,7 +235,7 @@ def bare(slots: Slots, said: Said) -> Effects:
 
 
 def _is_count(n: float, said: Said) -> bool:
-    """Whether a bare number is one of robots: they were counted last, or it corrects the first."""
+    """Return whether a bare number counts robots: they were counted last, or it corrects that."""
     before = chunks_of(said.standing.said, said.standing)
     if any("howmany" in c.kinds for c in before):
         return True
@@ -250,21 +250,21 @@ def _is_count(n: float, said: Said) -> bool:
 
 
 def _is_at_length(said: Said) -> bool:
-    """Whether robots keep a distance that was stated, and nothing else was said since."""
+    """Return whether robots keep a stated distance, and nothing else was changed since."""
     bounds = [g.get("clearance") or (0, 0) for g in said.standing.groups]
     others = {e["kind"] for e in said.last} - {"distance", "count", "add", "remove"}
     return not others and all(0 < high <= low + max(STATED, WIDEST * high) for low, high in bounds)
 
 
 def refuse_checks(slots: Slots, said: Said) -> Effects:
-    """Nothing moves uncertified."""
+    """Refuse to move robots without the checks."""
     return refuse(
         "Nothing moves without its checks; say what should change, and it is checked at once."
     )
 
 
 def refuse_through(slots: Slots, said: Said) -> Effects:
-    """No robot goes through the thing."""
+    """Refuse to drive robots through the thing."""
     return refuse(
         "Robots do not go through a thing, they drive around it. Say where they should stand, "
         "then go."
@@ -272,7 +272,7 @@ def refuse_through(slots: Slots, said: Said) -> Effects:
 
 
 def units(slots: Slots, said: Said) -> Effects:
-    """Lengths in metres, which take a scale."""
+    """Give lengths in metres if the picture has a scale, else refuse."""
     if said.standing.metres_per_pixel is None:
         return refuse(
             "The picture has no scale, so lengths are px; give it with --metres-per-pixel."
@@ -281,15 +281,15 @@ def units(slots: Slots, said: Said) -> Effects:
 
 
 def sides_free(slots: Slots, said: Said) -> Effects:
-    """Which sides no robots stand on."""
+    """Report which sides no robots stand on."""
     asks = "sideq" in slots or YES_OR_NO.match(said.line)
     return [{"kind": "talk", "about": "sides"}] if asks else None
 
 
 def _bound(slots: Slots, said: Said) -> Effect:
-    """What a distance is compared with, where it is asked whether robots keep it."""
+    """Return what a distance is compared with, for a question whether robots keep it."""
     sign = ">" if AT_LEAST.search(said.line) else "<" if AT_MOST.search(said.line) else ""
-    if NOBODY.search(said.line):  # is nobody closer: are all as far
+    if NOBODY.search(said.line):  # "is nobody closer" asks whether all are as far
         sign = {">": "<", "<": ">", "": ""}[sign]
     neighbours = slots.has("apart", "spacing", "num")
     of = "neighbour_px" if neighbours else "target_px"
@@ -298,7 +298,7 @@ def _bound(slots: Slots, said: Said) -> Effect:
 
 
 def asked(slots: Slots, said: Said, about: str) -> Effects:
-    """A question of the person's, answered by measures."""
+    """Read a question of the person's that measures answer; `about` is its topic."""
     robots = [r for named in slots.get("robots", ()) for r in named]
     metric = "unit" in slots and METRES.search(said.words)
     if metric and said.standing.metres_per_pixel is None:
@@ -322,7 +322,7 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
 
 
 def _things_asked(slots: Slots, said: Said, about: str) -> list[str] | None:
-    """The things asked about, of two the first stood about first; None where none can be told."""
+    """Return the things asked about, the first target before another; None if it is not clear."""
     slots.has("thing", "current")
     named = [str(c.kinds.get("thing", c.kinds.get("current", ""))) for c, _ in said.phrases]
     named = [known(name[1:], said.standing) if name[:1] == "?" else name for name in named]
@@ -339,7 +339,7 @@ def _things_asked(slots: Slots, said: Said, about: str) -> list[str] | None:
 
 
 def _details(slots: Slots, said: Said, about: str) -> Effect:
-    """What else a question asks, and of what it is when that is not what its frame is called."""
+    """Return further fields of a query, with `about` if it differs from the frame's name."""
     if about == "distance":
         return {"about": "spacing"} if slots.has("spacing", "apart") else {}
     if about == "at":
@@ -355,7 +355,7 @@ def _details(slots: Slots, said: Said, about: str) -> Effect:
 
 
 def _nearest_to_what(slots: Slots, said: Said, robots: list[int]) -> Effects:
-    """Which robot is the nearest to another one, a point or a centre."""
+    """Ask which robot is nearest to (or furthest from) another one, a point or a centre."""
     query: Effect = {"kind": "query", "about": "near", "most": slots["nearest"][0]}
     slots.has("relation", "inward")
     if robots:

@@ -1,7 +1,7 @@
-"""What is said to a plan that stands, to edits of it, an answer, or a question.
+"""Reader of words about an existing plan into edits of it, an answer, or a question.
 
-Where no frame of followups.yaml takes every phrase, it may be a whole new instruction; else it is
-asked about, quoting what was not understood. Nothing said is left out.
+Where no frame of followups.yaml takes every phrase, it may be a whole new instruction; else the
+person is asked, quoting what was not understood. No words are left out.
 """
 
 import re
@@ -30,23 +30,23 @@ WITHOUT_PLAN = (
     *(*TALK, "go", "hold", "undo", "redo", "first", "restart"),
     *("refuse_checks", "refuse_through"),
 )
-"""Frames that fit when no plan stands."""
+"""Frames that fit when there is no plan."""
 INSTRUCTING = (
     *("arrange", "arranged", "target", "close", "cage", "count", "split", "sides", "gap"),
     *("distance", "shift"),
 )
-"""Frames of what is an instruction when no plan stands."""
+"""Frames whose words are an instruction when there is no plan."""
 REMEDIES = ("out", "in", "distance", "scale", "spacing", "count", "add", "remove")
-"""Kinds of edits that say what is to be done about "too close"."""
+"""Kinds of edits that can be the remedy for "too close"."""
 KEEPS = re.compile(
     r"\bkeep\w* (?:(?:the|this|that|their|same) )*(?P<what>distance|number)\b", re.IGNORECASE
 )
 KEPT = {"distance": {"out", "in", "distance", "scale"}, "number": {"count", "add", "remove"}}
-"""What may not be changed where it is to be kept, by the kinds of edits that change it."""
+"""What is to be kept, and the kinds of edits that would change it."""
 ASKING = ("how", "what", "where", "who", "why")
-"""Words that no answer begins with."""
+"""Question words, with which no answer begins."""
 ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")
-"""Frames that build on the last change also after "no"."""
+"""Frames that build on the last change even after "no"."""
 PLAIN = (
     "What should change? For example: a bit further out, turn it 30 degrees, two more robots, or "
     "undo."
@@ -62,7 +62,7 @@ SEQUENCE = re.compile(
     r"(?<=[a-z0-9.)])\b[ ,:.]*(?P<rest>.+)$",
     re.IGNORECASE,
 )
-"""One thing now, the other once it is confirmed."""
+"""Two steps: one to take now, the other once it is confirmed."""
 ASIDE = re.compile(
     r"^\W*(?:(?:no|now|ok|okay|and|then|hm+|rather|actually|please)\b[ ,.]*)+"
     r"|[ ,]+(?:instead|rather|now|please)(?=[.!?]*$)",
@@ -72,7 +72,7 @@ DEFAULTS = (("spacing", "even"), ("fit", "normal"))
 
 
 def read_followup(words: str, standing: Standing | None) -> Followup:
-    """What is meant by words that are said when a plan stands, or talk that fits at any time."""
+    """Return what is meant by words about a plan; without a plan, talk or an instruction."""
     if standing is None:
         return _heard(words, standing)
     words = with_numbers(words, standing)
@@ -92,12 +92,12 @@ def read_followup(words: str, standing: Standing | None) -> Followup:
 
 
 def _is_settled(followup: Followup) -> bool:
-    """Whether it is understood, and about nothing that has to be found."""
+    """Return whether it is understood, and names nothing that has to be found."""
     return followup.kind not in ("ask", "refuse", "instruction") and not followup.things
 
 
 def _heard(words: str, standing: Standing | None) -> Followup:
-    """What is meant by words in which robots have their numbers."""
+    """Return what is meant by words in which robots have their numbers."""
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
     meant = _read(words, standing)
@@ -113,7 +113,7 @@ def _heard(words: str, standing: Standing | None) -> Followup:
 
 
 def _read(words: str, standing: Standing | None) -> Followup:
-    """What is meant by all of the words."""
+    """Return what is meant by all of the words, asides included."""
     sequence = SEQUENCE.match(spelled(words)) if standing else None
     if sequence:
         now = read_followup(sequence["now"] or sequence["lead"], standing)
@@ -137,7 +137,7 @@ def _read(words: str, standing: Standing | None) -> Followup:
 
 
 def commands(words: str, standing: Standing) -> bool:
-    """Whether words are a command or question, not only what another one leaves open."""
+    """Return whether words are a command or question of their own, not just an answer."""
     lead = next(iter(re.findall(r"[a-z']+", words.lower())), "")
     if lead in ASKING or (lead in word_set("questions") and words.rstrip().endswith("?")):
         return True
@@ -148,7 +148,7 @@ def commands(words: str, standing: Standing) -> bool:
 
 
 def _afresh(line: Line) -> str:
-    """The instruction after "start over", if there is one."""
+    """Return the instruction after "start over", "" if there is none."""
     if not line.chunks or "restart" not in line.chunks[0].kinds:
         return ""
     left = [c for c in line.chunks[1:] if not is_empty(c)]
@@ -156,7 +156,7 @@ def _afresh(line: Line) -> str:
 
 
 def _said_nothing(line: Line, *, there: bool) -> Followup:
-    """Talk, or yes and no to nothing that was asked."""
+    """Return the follow-up of words without content: talk, or a yes or no to no question."""
     if line.denies:
         options = ("undo", "a bit further out", "a bit closer")
         return _questioned(line, "What should be different? Nothing was asked.", options)
@@ -171,7 +171,7 @@ def _said_nothing(line: Line, *, there: bool) -> Followup:
 
 
 def _without_plan(line: Line, clauses: Sequence[Clause] | None) -> Followup:
-    """What is said when no plan stands."""
+    """Return the follow-up of words when there is no plan."""
     if clauses is None or all(c.frame in INSTRUCTING for c in clauses):
         return Followup("instruction", text=line.words)
     if all(c.frame in WITHOUT_PLAN for c in clauses):
@@ -180,19 +180,19 @@ def _without_plan(line: Line, clauses: Sequence[Clause] | None) -> Followup:
 
 
 def _questioned(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
-    """A question with its options; undo is one only where something was changed."""
+    """Return a question with its options; undo is one only where something was changed."""
     offered = tuple(o for o in options if line.standing.edits or o != "undo")
     return Followup("ask", text=question, options=offered)
 
 
 def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
-    """All that the clauses come to."""
+    """Return the follow-up that all clauses together amount to."""
     same = [c for c in clauses if c.frame == "again" and "same" in line.words_of(c.chunks).lower()]
     kept = [c for c in clauses if c not in same] or clauses  # "same again, closer"
     kept = _without_moot(line, kept)
     complaints = [c for c in kept if c.frame == "toofar"]
     remedies = [c for c in kept if c not in complaints and _edits(c)]
-    if complaints and remedies:  # how it should be is said beside what is wrong
+    if complaints and remedies:  # the remedy says what to do about the complaint
         plain = _gathered(line, [c for c in kept if c not in complaints])
         told = (*plain.background, *(line.words_of(c.chunks) for c in complaints))
         return replace(plain, background=told)
@@ -208,7 +208,7 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     if question is not None:
         return question
     undo = sum(e.get("steps", 0) for e in effects if e["kind"] == "undo")
-    # a spacing that is kept is that of before, and a ring holds with as many as there are then
+    # first keep the old spacing; last close the ring, with the final number of robots
     edits.sort(key=lambda e: (e.get("factor") != 1, e["kind"] == "escape-proof"))
     added = line.adds or clauses[0].frame in ADDING
     if "no " in line.led and edits and not undo and not added:
@@ -224,18 +224,18 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
 
 
 def _edits(clause: Clause) -> bool:
-    """Whether a clause changes something."""
+    """Return whether a clause changes something."""
     return any(e["kind"] not in (*NO_EDITS, "ask", "refuse", "undo") for e in clause.effects)
 
 
 def _once(edits: list[Effect]) -> list[Effect]:
-    """The edits, where what would undo itself is said twice once: "flip it, mirror it"."""
+    """Return the edits without repeats that would cancel out: "flip it, mirror it"."""
     twice = [k for k in range(1, len(edits)) if edits[k] == edits[k - 1]]
     return [e for k, e in enumerate(edits) if k not in twice or e["kind"] not in ("mirror", "swap")]
 
 
 def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
-    """The clauses without what others make moot: "too much, go back", "never mind, closer"."""
+    """Return the clauses that no others make moot: "too much, go back", "never mind, closer"."""
     undone = any(c.frame in ("undo", "first") for c in clauses)
     kept = [c for c in clauses if not (undone and c.frame in ADDING)]
     waving = {"mind", "forget"}
@@ -251,7 +251,7 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
 
 
 def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
-    """The question to ask where edits contradict each other."""
+    """Return the question to ask where edits contradict each other, else None."""
     alone = [
         e["kind"]
         for e in edits
@@ -278,7 +278,7 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
 
 
 def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: int) -> Followup:
-    """The follow-up of effects that neither ask nor refuse."""
+    """Return the follow-up of effects that neither ask nor refuse."""
     kinds = [e["kind"] for e in effects]
     stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*line.excepted]
     moved = {e.get(name) for e in line.standing.edits for name in _called_in(e)}
@@ -311,7 +311,7 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         to=to,
         edits=tuple(edits),
         stay=tuple(stays),
-        go="go" in kinds and not edits,  # what is new is looked at first
+        go="go" in kinds and not edits,  # the person looks at a new plan first
         hold="hold" in kinds,
         query=query and {k: v for k, v in query.items() if k != "kind"},
         about=_about([e["about"] for e in effects if e["kind"] == "talk"]),
@@ -319,18 +319,18 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
 
 
 def _called_in(edit: Mapping[str, Any]) -> tuple[str, ...]:
-    """The fields of an edit in which single robots are named."""
+    """Return the fields of an edit in which single robots are named."""
     return ("a", "b") if edit["kind"] == "swap" else ("robot",)
 
 
 def _about(talk: Sequence[str]) -> str:
-    """What is talked about above all: thanks and greetings come last."""
+    """Return the main topic of talk: thanks and greetings come last."""
     weighty = (about for about in talk if about not in ("thanks", "hello"))
     return next(weighty, talk[0] if talk else "")
 
 
 def _not_framed(line: Line) -> Followup:
-    """A whole new instruction, a form that the instruction reader knows, or a question."""
+    """Return a whole new instruction, a form that the instruction reader knows, or a question."""
     text = ASIDE.sub("", line.words)
     reading = read_instruction(text, line.standing.metres_per_pixel)
     left = (reading.stops, reading.unread, reading.language, reading.unscaled, reading.background)
@@ -362,7 +362,7 @@ def _not_framed(line: Line) -> Followup:
 
 
 def _not_understood(line: Line) -> Followup:
-    """A question that says what is clear, and quotes what is not."""
+    """Return a question that says what is clear, and quotes what is not."""
     parts = _parts(line.chunks)
     read = [p for p in parts if _is_clear(line, p)]
     unclear = [p for p in parts if p not in read]
@@ -386,7 +386,7 @@ def _is_clear(line: Line, chunks: Sequence[Chunk]) -> bool:
 
 
 def _parts(chunks: Sequence[Chunk]) -> list[list[Chunk]]:
-    """The phrases between separators."""
+    """Return the phrases between separators."""
     found: list[list[Chunk]] = [[]]
     for chunk in chunks:
         if "sep" in chunk.kinds:
