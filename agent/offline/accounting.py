@@ -154,7 +154,9 @@ class _Reader:
             if goes_on:
                 share = 1.0
             goes_on = sentence[-1].symbol == ";"
-            counts = [k for k in place if self.items[k].quantity and not self._tells(k)]
+            counts = [
+                k for k in place if self.items[k].quantity and not self._is_background_number(k)
+            ]
             if demanded & {*place} or counts:
                 share = 1.0
             ordered = any(d.sets == "robots" and d.first in place for d in self.demands)
@@ -358,7 +360,11 @@ class _Reader:
             return "background"
         if item.quantity is not None:
             return (
-                "" if self._counts_corners(item) else "background" if self._tells(k) else "unread"
+                ""
+                if self._counts_corners(item)
+                else "background"
+                if self._is_background_number(k)
+                else "unread"
             )
         beside = {self.items[n].label for n in (k - 1, k + 1) if n in range(len(self.items))}
         sure = SURE_BACKGROUND if "background" in beside else SURE_ALONE
@@ -373,7 +379,7 @@ class _Reader:
         known = goes_with(item.symbol, self.classes[k], self.reading.relation)
         return "" if known else "unread"
 
-    def _tells(self, k: int) -> bool:
+    def _is_background_number(self, k: int) -> bool:
         """Return whether a number stands in a clause that is surely background: "come at three"."""
         clause = next(c for c in self.clauses if k in c)
         words = [self.items[j] for j in clause]

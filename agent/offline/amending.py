@@ -23,7 +23,7 @@ RECOUNT = re.compile(
 )
 
 
-def amended(words: str) -> str:
+def with_last_count(words: str) -> str:
     """Return the words with the robot count given last: "9 robots, no wait, ten robots"."""
     again = RECOUNT.search(words)
     first = COUNT.search(words)
@@ -33,9 +33,9 @@ def amended(words: str) -> str:
     return rest[: first.start()] + again["count"] + rest[first.end("count") :]
 
 
-def typed(words: str) -> str:
+def repaired(words: str) -> str:
     """Return an instruction with corrections applied, and typos fixed if it is understood then."""
-    words = amended(words)
+    words = with_last_count(words)
     corrected = spelled(words)
     if corrected != words and read_instruction(words).unread:
         return words if read_instruction(corrected).unread else corrected

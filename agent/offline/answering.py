@@ -136,7 +136,7 @@ def arrived(data: Mapping[str, Any], scale: float | None) -> str:
     return f"Not all arrived after {data['corrections']} corrections. {data['reason']}"
 
 
-def said_of_heading(standing: Standing) -> str:
+def heading_text(standing: Standing) -> str:
     """Return a sentence on which way robots look, according to the current plan."""
     told: list[str] = []
     for group in standing.groups:
@@ -149,7 +149,7 @@ def said_of_heading(standing: Standing) -> str:
     return f"{'; '.join(told)}."
 
 
-def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
+def query_text(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
     """Return the answer to a question about the plan, from what was measured."""
     if "length_px" in data:
         length, width = (length_text(data[name], scale) for name in ("length_px", "width_px"))

@@ -78,7 +78,7 @@ DEMANDING = word_set("demanding")
 def without_asides(words: str, standing: Standing) -> tuple[str, tuple[str, ...]]:
     """Return the words without the parts that only state something, and those parts."""
     parts = [p for part in PART.findall(REASON.sub(", ", words)) for p in _run_on(part)]
-    told = [k for k, part in enumerate(parts) if _tells(part, standing)]
+    told = [k for k, part in enumerate(parts) if _only_states(part, standing)]
     kept = "".join(part for k, part in enumerate(parts) if k not in told)
     if parts and not told and OF_ONE.match(parts[0]) and IT.search(kept[len(parts[0]) :]):
         plain = IDLE.sub("", parts[0])
@@ -95,7 +95,7 @@ def _run_on(part: str) -> list[str]:
     return [part[: after.start()] + ", ", part[after.end() :]] if after else [part]
 
 
-def _tells(part: str, standing: Standing) -> bool:
+def _only_states(part: str, standing: Standing) -> bool:
     """Return whether a part states something and demands nothing."""
     found = chunks_of(IDLE.sub("", part), standing)
     kinds = {kind for chunk in found for kind in chunk.kinds}

@@ -196,7 +196,9 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
-    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and _is_told(thing))
+    alone = reply["things"] == 1 or (
+        matches and matches[0]["id"] == "c1" and _fits_most_salient(thing)
+    )
     if reply["settled"] and (named or alone or not _says_little(thing, _is_clear(reply))):
         return Found(matches[0]["id"], thing.wording, tuple(matches[0].get("reasons", ())))
     if matches:
@@ -240,7 +242,7 @@ def _trouble(thing: Reference) -> str:
     return ""
 
 
-def _is_told(thing: Reference) -> bool:
+def _fits_most_salient(thing: Reference) -> bool:
     """Return whether the words fit the most salient thing for what it is, not for its rank.
 
     Unknown words suggest that there are several to tell apart; and if nothing measures the noun,

@@ -17,7 +17,7 @@ from . import (
     followup_teams,
     followup_turns,
 )
-from .followup_edits import Effect, Effects, Said, ask
+from .followup_edits import Effect, Effects, Utterance, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
 from .followup_words import Chunk, chunks_of, rules
@@ -165,14 +165,11 @@ class Line:
         """Return the phrases without those said not to be meant: "to the left, not the right"."""
         robots = any("robots" in c.kinds for c in chunks)
         for k, chunk in enumerate(chunks):
-            no, after, rest = (
-                chunks[k + 1 : k + 2],
-                chunks[k + 2 :],
-                [*chunks[:k], *chunks[k + 2 :]],
-            )
+            no, after = chunks[k + 1 : k + 2], chunks[k + 2 :]
+            rest = [*chunks[:k], *after]
             denied = "neg" in chunk.kinds and set(chunk.kinds) <= {"neg", "clear"} and no
             ended = not after or "sep" in after[0].kinds
-            if denied and ended and any(_alike(no[0], c) for c in rest):
+            if denied and ended and any(_contrasts(no[0], c) for c in rest):
                 return rest[:-1] if rest and "sep" in rest[-1].kinds else rest
             named = self.words[chunk.start : chunk.end].lower().startswith("not ")
             if robots and named and "other" in chunk.kinds:  # "not that one, number six"
@@ -184,7 +181,9 @@ class Line:
         asks, only_asks = self._asks()
         edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
         phrases = tuple((c, self.words[c.start : c.end]) for c in chunks)
-        said = Said(self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words)
+        said = Utterance(
+            self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words
+        )
         for frame in frames():
             if (frame.asks and not asks) or (
                 only_asks and not frame.asks and frame.name not in TALK
@@ -193,7 +192,7 @@ class Line:
             slots = frame.slots(chunks)
             if frame.name in ("thanks", "hello") and not all(map(_is_kind, chunks)):
                 continue
-            effects = None if slots is None else _built(frame, slots, said)
+            effects = None if slots is None else _frame_effects(frame, slots, said)
             changes = any(e["kind"] not in NO_EDITS for e in effects or ())
             if effects and slots is not None and not (changes and slots.unused):
                 teamed = tuple(self._of_team(e, chunks, said.words) for e in effects)
@@ -303,7 +302,7 @@ class Line:
     ) -> list[Clause] | None:
         """Return the clauses with phrases put in the place of others of their kind, or None."""
         for at in range(len(clauses) - 1, -1, -1):
-            chunks = _with(clauses[at], after)
+            chunks = _with_replaced(clauses[at], after)
             clause = None if chunks is None else self._framed(chunks, ())
             if clause is not None and clause.frame == clauses[at].frame:
                 return [*clauses[:at], clause, *clauses[at + 1 :]]
@@ -322,7 +321,7 @@ def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
     return found
 
 
-def _alike(a: Chunk, b: Chunk) -> bool:
+def _contrasts(a: Chunk, b: Chunk) -> bool:
     """Return whether two phrases give different values of the same kind."""
     kinds = [k for k in (*REPLACED, *AMOUNTS) if k in a.kinds and k in b.kinds]
     found = not str(a.kinds.get("thing", "")).startswith("?")
@@ -353,7 +352,7 @@ def _is_pure(chunk: Chunk) -> bool:
     return bool({"filler", "sep", "correction"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
 
 
-def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
+def _with_replaced(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
     """Return the phrases of a clause with others put in; None where one has no place there."""
     chunks, changed = list(clause.chunks), False
     for new in after:
@@ -382,7 +381,7 @@ def _stands_for(new: Chunk, old: Chunk) -> bool:
     return amounts or bool(set(new.kinds) & set(old.kinds) & {*REPLACED})
 
 
-def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
+def _frame_effects(frame: Frame, slots: Slots, said: Utterance) -> Effects:
     """Return the effects of a frame, from the function of the frame's name."""
     if frame.name.startswith("ask_"):
         return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
@@ -392,7 +391,7 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
         *(followup_edits, followup_moves, followup_parts, followup_sides, followup_teams),
         *(followup_last, followup_turns),
     )
-    build: Callable[[Slots, Said], Effects] = next(
+    build: Callable[[Slots, Utterance], Effects] = next(
         getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
     )
     return build(slots, said)

@@ -12,14 +12,14 @@ from typing import Any
 
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
-from .amending import typed
-from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
+from .amending import repaired
+from .answering import arrived, heading_text, query_text, said_of_edit, said_of_undo, talk
 from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup import Followup
 from .followup_things import UNNAMED, pointing_at
 from .followups import commands, read_followup
-from .pointed import heeded, shown_now
+from .pointed import shown_now, using_pointed
 from .sharing import shared
 from .standing import Standing
 
@@ -60,7 +60,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     words, messages = pointing_at(task.instruction) if new else task.instruction, turn[1:]
     followup = read_followup(words, standing)
     if standing is None and not before and followup.kind != "talk":
-        return replace(task, instruction=typed(words)), turn
+        return replace(task, instruction=repaired(words)), turn
     while followup.kind == "ask" or _goes_on(messages, standing):
         answer, messages = _answer_to(messages)
         if answer is None:
@@ -70,15 +70,15 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
             return Reply(text="Nothing was changed.")
         words = _words_meant(words, followup, answer, standing)
         followup = read_followup(words, standing)
-    followup = heeded(task, followup) if shown else followup
+    followup = using_pointed(task, followup) if shown else followup
     if followup.kind == "instruction":
         fresh = words != task.instruction
         said = followup.text if standing else words
-        return replace(task, instruction=typed(said)), (turn[0], *messages) if fresh else turn
-    return _told(followup, _Steps(task, standing, followup, messages, before).next())
+        return replace(task, instruction=repaired(said)), (turn[0], *messages) if fresh else turn
+    return _with_background(followup, _Steps(task, standing, followup, messages, before).next())
 
 
-def _told(followup: Followup, reply: Reply) -> Reply:
+def _with_background(followup: Followup, reply: Reply) -> Reply:
     """Return the reply; at the end of a turn it also quotes what was read as background."""
     if reply.calls or not followup.background:
         return reply
@@ -207,7 +207,7 @@ class _Steps:
         query: dict[str, Any] = dict(self.followup.query or {})
         results = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"]
         if query["about"] == "heading":
-            return Reply(text=said_of_heading(standing))
+            return Reply(text=heading_text(standing))
         shape, scale = self.done.get("describe_shape"), self.task.metres_per_pixel
         measured = results[0] if results else shape
         robots, thing = query.get("robots", []), str(query.get("thing", ""))
@@ -222,7 +222,7 @@ class _Steps:
             data = json.loads(measured.text)
             if query["about"] == "nearest" and thing and thing not in standing.targets:
                 return self._nearest_to(thing, data, standing, query)
-            return Reply(text=said_of_query(query, data, scale))
+            return Reply(text=query_text(query, data, scale))
         two = len(robots) == 2 and "each" not in query
         if (thing or two) and query["about"] in ("distance", "spacing"):
             ends = [*(f"r{r}" for r in robots), *([thing] if thing else [])]
@@ -243,7 +243,7 @@ class _Steps:
             return _calling("measure", {"a": f"r{rows[len(measured)]['robot']}", "b": thing})
         ways = [json.loads(m.text).get("nearest_px", math.inf) for m in measured]
         seen = [r | {"target": thing, "target_px": w} for r, w in zip(rows, ways, strict=True)]
-        return Reply(text=said_of_query(query, {"each": seen}, self.task.metres_per_pixel))
+        return Reply(text=query_text(query, {"each": seen}, self.task.metres_per_pixel))
 
     def _change(self, standing: Standing) -> Reply:
         """Find things, take back, measure and edit; then move robots if asked, and report."""
@@ -293,7 +293,7 @@ class _Steps:
             if measured is None:
                 return _calling("measure", {"a": "plan"})
             assert self.standing is not None
-            edits = [_by_way(edit, json.loads(measured.text), self.standing) for edit in edits]
+            edits = [_as_xy(edit, json.loads(measured.text), self.standing) for edit in edits]
         named = json.dumps(edits)
         for phrase, name in ids.items():
             named = named.replace(json.dumps(phrase), json.dumps(name))
@@ -378,7 +378,7 @@ class _Steps:
         return Reply(text=f"{told} {text}".strip())
 
 
-def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
+def _as_xy(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
     """Return an edit with a robot's way out from its target, or in, turned into x and y, px."""
     if not isinstance(edit.get("by"), dict):
         return edit

@@ -54,7 +54,7 @@ OTHER = "?the other one"
 
 
 @dataclass(frozen=True)
-class Said:
+class Utterance:
     """A clause, and the plan and words that it is read with.
 
     Attributes:
@@ -126,7 +126,7 @@ def rounded(value: float) -> float:
     return round(value, 3) + 0.0  # never -0.0
 
 
-def offset(slots: Slots, said: Said) -> Effects:
+def offset(slots: Slots, said: Utterance) -> Effects:
     """Move robots further out or in: by px, a share, or a factor of the distance."""
     ways = set(slots["radial"])
     length = bare_length(slots)
@@ -146,7 +146,7 @@ def offset(slots: Slots, said: Said) -> Effects:
     return [{"kind": kind, "factor": rounded(factor_of(slots))}]
 
 
-def _is_mine(names: Sequence[Any], said: Said) -> bool:
+def _is_mine(names: Sequence[Any], said: Utterance) -> bool:
     """Return whether a single noun means the plan's only target: "further from the car"."""
     strange = len(names) == 1 and names[0][:1] == "?"
     return strange and is_noun(str(names[0])[1:]) and len(said.standing.targets) == 1
@@ -158,7 +158,7 @@ def is_noun(word: str) -> bool:
     return found is not None and found.kind == "noun"
 
 
-def ratio(slots: Slots, said: Said) -> Effects:
+def ratio(slots: Slots, said: Utterance) -> Effects:
     """Multiply the distance: twice, half, three times as far."""
     factor = float(slots["num"][0]) if "num" in slots else float(slots["ratio"][0])
     radial = {e["kind"] for e in said.last} <= {"out", "in", "distance"}
@@ -173,7 +173,7 @@ def ratio(slots: Slots, said: Said) -> Effects:
     ]
 
 
-def distance(slots: Slots, said: Said) -> Effects:
+def distance(slots: Slots, said: Utterance) -> Effects:
     """Set the distance from the thing; "at least" and "at most" set it too."""
     slots.has("bound")
     if any(r != said.standing.relation for r in slots.get("relation", ())):
@@ -182,7 +182,7 @@ def distance(slots: Slots, said: Said) -> Effects:
     return None if length is None else [{"kind": "distance", "px": length}]
 
 
-def spacing(slots: Slots, said: Said) -> Effects:
+def spacing(slots: Slots, said: Utterance) -> Effects:
     """Set the spacing between robots (at least or exactly), or change it by a factor."""
     slots.has("bound")
     if "spacing" in slots or "ratio_apart" in slots:
@@ -199,7 +199,7 @@ def spacing(slots: Slots, said: Said) -> Effects:
     ]
 
 
-def rotate(slots: Slots, said: Said) -> Effects:
+def rotate(slots: Slots, said: Utterance) -> Effects:
     """Rotate the formation, clockwise unless stated otherwise."""
     directions = {
         *slots.get("spin", ()),
@@ -229,13 +229,13 @@ def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
     return next((e for e in reversed(edits) if e["kind"] in kinds), None)
 
 
-def upended(slots: Slots, said: Said) -> Effects:
+def upended(slots: Slots, said: Utterance) -> Effects:
     """Turn it upside down, by half a turn: a V then opens to the other side."""
     upside = slots["axis"] == ["top-bottom"] and UPSIDE.search(said.words)
     return [{"kind": "rotate", "degrees": 180}] if upside else None
 
 
-def mirror(slots: Slots, said: Said) -> Effects:
+def mirror(slots: Slots, said: Utterance) -> Effects:
     """Mirror the formation, left for right unless stated otherwise."""
     across = {"left": "left-right", "right": "left-right", "up": "top-bottom", "down": "top-bottom"}
     across |= {"top": "top-bottom", "bottom": "top-bottom"}
@@ -245,7 +245,7 @@ def mirror(slots: Slots, said: Said) -> Effects:
     return [{"kind": "mirror", "axis": axis}]
 
 
-def scale(slots: Slots, said: Said) -> Effects:
+def scale(slots: Slots, said: Utterance) -> Effects:
     """Make it bigger or smaller; right after a gap was changed, the gap."""
     opens = said.standing.groups[0].get("opening") is not None
     if opens and _of_kind(said.last, "opening") and slots.has("scale"):
@@ -267,14 +267,14 @@ def scale(slots: Slots, said: Said) -> Effects:
     ]
 
 
-def resized(slots: Slots, said: Said) -> Effects:
+def resized(slots: Slots, said: Utterance) -> Effects:
     """Scale it to so many times its size."""
     slots.has("size", "scale")
     factor = float(slots["num"][0] if "num" in slots else slots["share"][0])
     return [{"kind": "scale", "factor": rounded(factor)}] if factor > 0 else None
 
 
-def snug(slots: Slots, said: Said) -> Effects:
+def snug(slots: Slots, said: Utterance) -> Effects:
     """Change the spacing (tighter, looser) in a row or after a change of spacing."""
     apart = bool(said.last) and said.last[-1]["kind"] == "spacing"
     if apart and LESSER.match(said.words) and "factor" in said.last[-1] and len(slots) == 1:
@@ -288,7 +288,7 @@ def snug(slots: Slots, said: Said) -> Effects:
     return [{"kind": "spacing", "factor": rounded(factor if wide else 1 / factor)}]
 
 
-def heading(slots: Slots, said: Said) -> Effects:
+def heading(slots: Slots, said: Utterance) -> Effects:
     """Set which way robots look."""
     slots.has("turn", "where")
     if "unface" in slots or "current" in slots:
@@ -323,7 +323,7 @@ def heading(slots: Slots, said: Said) -> Effects:
     return [{"kind": "heading", "to": float(slots["angle"][0])}]
 
 
-def keepout(slots: Slots, said: Said) -> Effects:
+def keepout(slots: Slots, said: Utterance) -> Effects:
     """Keep robots clear of another thing."""
     if not slots.has("thing", "there", "other"):
         return ask(
@@ -333,7 +333,7 @@ def keepout(slots: Slots, said: Said) -> Effects:
     return to if isinstance(to, list) else [{"kind": "keep-out", "ids": [to]}]
 
 
-def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Effect]:
+def where(slots: Slots, said: Utterance, option: str = "around {}") -> str | list[Effect]:
     """Return the id of the thing meant, "?" and its words if it has to be found, or a question."""
     standing = said.standing
     if "thing" in slots:
@@ -351,7 +351,7 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
     return OTHER
 
 
-def centre_of(slots: Slots, said: Said) -> tuple[float, float] | None:
+def centre_of(slots: Slots, said: Utterance) -> tuple[float, float] | None:
     """Return the centre that is named, of a thing, the picture or the target, px; else None."""
     if not CENTRE.search(said.words):
         return None

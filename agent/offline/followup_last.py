@@ -10,7 +10,7 @@ from .followup_edits import (
     TURN,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     factor_of,
     much_of,
@@ -29,7 +29,7 @@ FURTHER = re.compile(r"\b(?:further|farther)(?: please)?\W*$", re.IGNORECASE)
 """Without a direction, this goes on in that of the last move."""
 
 
-def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
+def _latest(said: Utterance, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
     """Return the last edit of one of these kinds; if robots moved one by one, all those edits."""
     edits = [dict(e) for e in said.last]
     while edits and edits[-1]["kind"] not in kinds:
@@ -38,7 +38,7 @@ def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
     return edits[alike[-1] + 1 if alike else 0 :] if edits and "robot" in edits[-1] else edits[-1:]
 
 
-def further_on(slots: Slots, said: Said) -> Effects:
+def further_on(slots: Slots, said: Utterance) -> Effects:
     """Read "a bit further" after a robot was moved or all were turned: on in that direction."""
     kinds = {e["kind"] for e in _latest(said)}
     slots.has("radial", "again")
@@ -47,7 +47,7 @@ def further_on(slots: Slots, said: Said) -> Effects:
     return more(slots, said) if FURTHER.search(said.words) else None
 
 
-def again(slots: Slots, said: Said) -> Effects:
+def again(slots: Slots, said: Utterance) -> Effects:
     """Repeat the last change, or redo what was just taken back."""
     if said.standing.redo and not said.before and not said.last:
         return [{"kind": "undo", "steps": -1}]
@@ -55,7 +55,7 @@ def again(slots: Slots, said: Said) -> Effects:
     return edits or None
 
 
-def more(slots: Slots, said: Said) -> Effects:
+def more(slots: Slots, said: Utterance) -> Effects:
     """Do more of the last change; without an amount, as much again."""
     last = _latest(said, (*RELATIVE, "opening", "distance"))
     if not last:
@@ -65,7 +65,7 @@ def more(slots: Slots, said: Said) -> Effects:
     return found if len(found) == len(last) else None
 
 
-def more_of(slots: Slots, said: Said) -> Effects:
+def more_of(slots: Slots, said: Utterance) -> Effects:
     """Do more of the last change for some of the robots it was about."""
     named = {r for robots in slots["robots"] for r in robots}
     slots.has("make", "move")
@@ -75,7 +75,7 @@ def more_of(slots: Slots, said: Said) -> Effects:
     return found if len(found) == len(named) else None
 
 
-def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
+def _again(last: Effect, slots: Slots, said: Utterance) -> Effect | None:
     kind, size = last["kind"], min(said.standing.size)
     much = much_of(slots)
     length = float(slots["px"][0]) if "px" in slots else None
@@ -124,7 +124,7 @@ def _further(last: Effect, way: float | None) -> Effect | None:
     return last | ({"dx": x, "dy": y} if last["kind"] == "shift" else {"by": [x, y]})
 
 
-def less_by(slots: Slots, said: Said) -> Effects:
+def less_by(slots: Slots, said: Utterance) -> Effects:
     """Reduce the distance by px; None if the last change was of something else."""
     distances = ("distance", "out", "in")
     if said.last and said.last[-1]["kind"] not in distances:
@@ -132,7 +132,7 @@ def less_by(slots: Slots, said: Said) -> Effects:
     return [{"kind": "in", "px": float(slots["px"][0])}]
 
 
-def less(slots: Slots, said: Said) -> Effects:
+def less(slots: Slots, said: Utterance) -> Effects:
     """Take back half of the last change, whatever amount is given."""
     slots.has("much", "ratio", "back")
     last = _latest(said, (*RELATIVE, "opening"))
@@ -175,7 +175,7 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
     return None
 
 
-def otherway(slots: Slots, said: Said) -> Effects:
+def otherway(slots: Slots, said: Utterance) -> Effects:
     """Make the last change the other way; with "a bit" or the like, take half of it back."""
     turning = (*RELATIVE, "opening", "sides", "heading")
     last = _latest(said, turning)
@@ -247,7 +247,7 @@ def _turned(edit: Effect) -> Effect | None:
     return _scaled(edit, -1.0) if kind in ("rotate", "shift", "place") else None
 
 
-def toofar(slots: Slots, said: Said) -> Effects:
+def toofar(slots: Slots, said: Utterance) -> Effects:
     """Take half of the last change back if it led to "too far" or "too close", else move a bit."""
     if "dir" in slots:
         back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]

@@ -6,7 +6,7 @@ from .followup_edits import (
     FACTOR,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     bare_length,
     centre_of,
@@ -24,7 +24,7 @@ TEAM = re.compile(
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
 
 
-def way(slots: Slots, said: Said) -> tuple[float, float] | None:
+def way(slots: Slots, said: Utterance) -> tuple[float, float] | None:
     """Return the move left, right, up or down, as x and y in px; None where it is not clear."""
     vectors = [VECTOR[d] for d in slots["dir"]]
     length = bare_length(slots)
@@ -49,7 +49,7 @@ BESIDE = re.compile(
 """Words for where robots stand or how many go: "to the left of it", "5 robots to the left"."""
 
 
-def shift(slots: Slots, said: Said) -> Effects:
+def shift(slots: Slots, said: Utterance) -> Effects:
     """Move all robots left, right, up or down; after moves of single robots, those."""
     by = None if BESIDE.search(said.words) else way(slots, said)
     if by is None:
@@ -60,7 +60,7 @@ def shift(slots: Slots, said: Said) -> Effects:
     return [{"kind": "shift", "dx": by[0], "dy": by[1]}]
 
 
-def approach(slots: Slots, said: Said) -> Effects:
+def approach(slots: Slots, said: Utterance) -> Effects:
     """Move all robots some way towards a thing."""
     current = slots.get("current")
     to = str(current[-1]) if current else where(slots, said, "towards {}")
@@ -79,7 +79,7 @@ def approach(slots: Slots, said: Said) -> Effects:
     return [{"kind": "shift", "dx": round(x / far * px, 1), "dy": round(y / far * px, 1)}]
 
 
-def place(slots: Slots, said: Said) -> Effects:
+def place(slots: Slots, said: Utterance) -> Effects:
     """Move single robots: to a point, to a thing, or some way on."""
     robots = [r for named in slots["robots"] for r in named]
     if slots.has("relation", "inward"):
@@ -116,7 +116,7 @@ def place(slots: Slots, said: Said) -> Effects:
     return [{"kind": "place", "robot": r, "by": by} for r in robots]
 
 
-def _some_way(way: str, slots: Slots, said: Said) -> dict[str, float]:
+def _some_way(way: str, slots: Slots, said: Utterance) -> dict[str, float]:
     """Return a robot's way as a factor on its distance, and the most that it may be, px."""
     most = round(WAY[much_of(slots)] * min(said.standing.size))
     return {way: most, "factor": FACTOR[much_of(slots)]}

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .followup_edits import EXACT, Effect, Effects, Said, ask, factor_of, rounded, where
+from .followup_edits import EXACT, Effect, Effects, Utterance, ask, factor_of, rounded, where
 from .followup_frames import Slots
 from .followup_teams import SHARES, how_many_fewer, how_many_more, whole
 from .followup_things import known
@@ -18,7 +18,7 @@ PLACING = frozenset(
 """Kinds of phrases that do not matter for how many go where."""
 
 
-def changed(slots: Slots, said: Said) -> Effects:
+def changed(slots: Slots, said: Utterance) -> Effects:
     """Change a quantity: by an amount, to an amount, or by a factor."""
     way, of = str(slots["grow"][0]), str(slots["quantity"][0])
     exact = way == "set" or EXACT.search(said.words) is not None
@@ -46,7 +46,7 @@ def changed(slots: Slots, said: Said) -> Effects:
     return [{"kind": {"size": "scale"}.get(of, of), "factor": rounded(factor)}]
 
 
-def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -> Effects:
+def _teamed(slots: Slots, said: Utterance, way: str, factor: float, *, exact: bool) -> Effects:
     """Change the number of robots."""
     n = whole(slots)
     if "num" not in slots and way[0].isdecimal():
@@ -61,7 +61,7 @@ def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -
     return None if fewer and n >= said.count else [{"kind": "remove" if fewer else "add", "n": n}]
 
 
-def allotted(slots: Slots, said: Said) -> Effects:
+def allotted(slots: Slots, said: Utterance) -> Effects:
     """Put so many robots at this thing and so many at that one, or add or remove some there."""
     standing, told = said.standing, _roles(said)
     slots.used.update(slots)
@@ -93,7 +93,7 @@ def _group_of(thing: str, groups: Mapping[str, int]) -> Effect:
     return {"to": thing}
 
 
-def _roles(said: Said) -> list[tuple[str, Any]] | None:
+def _roles(said: Utterance) -> list[tuple[str, Any]] | None:
     """Return the role and value of each phrase, in order; None where one has another role."""
     found: list[tuple[str, Any]] = []
     names = ("thing", "current", *VAGUE, "num", "portion", "each", *MODES)
@@ -118,7 +118,7 @@ def _roles(said: Said) -> list[tuple[str, Any]] | None:
 
 
 def _matched(
-    told: Sequence[tuple[str, Any]], said: Said, targets: list[str]
+    told: Sequence[tuple[str, Any]], said: Utterance, targets: list[str]
 ) -> list[tuple[str, int]] | None:
     """Return pairs of thing and number of robots; None where they do not match."""
     things = [(kind, value) for kind, value in told if kind in ("thing", *VAGUE)]
@@ -140,7 +140,7 @@ def _matched(
     return list(zip(names, numbers, strict=True)) if len(numbers) == len(names) > 0 else None
 
 
-def _count(value: Any, said: Said) -> int:
+def _count(value: Any, said: Utterance) -> int:
     """Return a number of robots, given as such or as a share; 0 if it is not a valid number."""
     if isinstance(value, str):
         return said.count // SHARES[value]
@@ -148,7 +148,7 @@ def _count(value: Any, said: Said) -> int:
 
 
 def _resolved_things(
-    things: Sequence[tuple[str, Any]], said: Said, targets: Sequence[str]
+    things: Sequence[tuple[str, Any]], said: Utterance, targets: Sequence[str]
 ) -> list[str] | None:
     """Return the ids of things, working out "here" or "the other" from those named; else None."""
     found: list[str | None] = [str(v) if kind == "thing" else None for kind, v in things]
@@ -170,7 +170,9 @@ def _resolved_things(
     return [t for t in found if t is not None]
 
 
-def _moved(wish: dict[str, int], groups: Mapping[str, int], said: Said, *, each: bool) -> Effects:
+def _moved(
+    wish: dict[str, int], groups: Mapping[str, int], said: Utterance, *, each: bool
+) -> Effects:
     """Return the edits after which the wished number of robots stands about each named thing."""
     now = {t: int(said.standing.groups[k - 1]["robots"]) for t, k in groups.items()}
     if len(wish) < 2:

@@ -13,7 +13,7 @@ from .followup_edits import (
     SIDES,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     bare_length,
     factor_of,
@@ -34,7 +34,7 @@ WHOLE = re.compile(r"\b(?:ring|circle|row|line|formation|v|u|star|wedge|arc)\b",
 """Words for the whole formation, whose width is not that of a gap."""
 
 
-def sides(slots: Slots, said: Said) -> Effects:
+def sides(slots: Slots, said: Utterance) -> Effects:
     """Put robots only on some sides, or leave sides free."""
     named = [SIDE_OF.get(s, s) for s in (*slots.get("flank", ()), *slots.get("side", ()))]
     without = "neg" in slots or "free" in slots
@@ -49,7 +49,7 @@ def sides(slots: Slots, said: Said) -> Effects:
     return [{"kind": "side", "side": named[0]}]
 
 
-def opposite(slots: Slots, said: Said) -> Effects:
+def opposite(slots: Slots, said: Utterance) -> Effects:
     """Change to the side opposite the one that robots stand on, or that is open."""
     group = said.standing.groups[0]
     opening = group.get("opening_towards")
@@ -69,7 +69,7 @@ def opposite(slots: Slots, said: Said) -> Effects:
     return [{"kind": "sides", "only": [f"{OPPOSITE[side]}{space}{half}"]}]
 
 
-def not_that_side(slots: Slots, said: Said) -> Effects:
+def not_that_side(slots: Slots, said: Utterance) -> Effects:
     """Leave the sides free that robots were last put on."""
     last = next((e for e in reversed(said.last) if "only" in e), None)
     named = list(last["only"]) if last else list(said.standing.groups[0].get("sides") or ())
@@ -81,7 +81,7 @@ def not_that_side(slots: Slots, said: Said) -> Effects:
     return [{"kind": "sides", "without": named}]
 
 
-def gap(slots: Slots, said: Said) -> Effects:
+def gap(slots: Slots, said: Utterance) -> Effects:
     """Leave a gap towards something, make it wider or narrower, or put it on the other side."""
     opening: Effect = {"kind": "opening"}
     slots.has("gap")
@@ -124,18 +124,18 @@ def gap(slots: Slots, said: Said) -> Effects:
     return [opening | ({} if length is None else {"px": length})]
 
 
-def reopened(slots: Slots, said: Said) -> Effects:
+def reopened(slots: Slots, said: Utterance) -> Effects:
     """Turn an existing gap towards something else; None if there is none."""
     return gap(slots, said) if said.standing.groups[0].get("opening") is not None else None
 
 
-def reopened_now(slots: Slots, said: Said) -> Effects:
+def reopened_now(slots: Slots, said: Utterance) -> Effects:
     """Turn the gap that the last change was about towards something else."""
     about = bool(said.last) and said.last[-1]["kind"] == "opening"
     return reopened(slots, said) if about else None
 
 
-def sided(slots: Slots, said: Said) -> Effects:
+def sided(slots: Slots, said: Utterance) -> Effects:
     """Read a bare side: the one that robots are to stand on, or that the gap is to be on."""
     side = str(slots["side"][0])
     moved = said.denies and not said.standing.edits  # else "left" is a direction
@@ -154,7 +154,7 @@ def sided(slots: Slots, said: Said) -> Effects:
     return [{"kind": "sides", "only": [side]}] if group.get("sides") else None
 
 
-def wider(slots: Slots, said: Said) -> Effects:
+def wider(slots: Slots, said: Utterance) -> Effects:
     """Make it wider or narrower: the gap if there is one, else the width or the spacing."""
     if said.standing.groups[0].get("opening") is not None and not WHOLE.search(said.words):
         return gap(slots, said)
@@ -170,7 +170,7 @@ def wider(slots: Slots, said: Said) -> Effects:
     return ask("What should be narrower?", "closer", "closer together")
 
 
-def close(slots: Slots, said: Said) -> Effects:
+def close(slots: Slots, said: Utterance) -> Effects:
     """Close the ring again; "no gap, back" takes back the last change if that opened it."""
     slots.has("relation")
     to_none = BACK_TO.search(said.words) is not None  # the gap before the last change may remain
@@ -182,7 +182,7 @@ def close(slots: Slots, said: Said) -> Effects:
     return [{"kind": "close"}]
 
 
-def closed_with(slots: Slots, said: Said) -> Effects:
+def closed_with(slots: Slots, said: Utterance) -> Effects:
     """Close the ring with a given number of robots."""
     counted = count(slots, replace(said, phrases=()))
     if counted is None:
@@ -190,7 +190,7 @@ def closed_with(slots: Slots, said: Said) -> Effects:
     return [*(close(slots, said) or ()), *(e for e in counted if e["kind"] != "talk")]
 
 
-def add_on_side(slots: Slots, said: Said) -> Effects:
+def add_on_side(slots: Slots, said: Utterance) -> Effects:
     """Add robots on one side: to the row that stands there, else ask."""
     n, groups = whole(slots), said.standing.groups
     side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]))
@@ -204,12 +204,12 @@ def add_on_side(slots: Slots, said: Said) -> Effects:
     return ask(question, f"{n} more", f"{n} more, all only on the {side} side")
 
 
-def opened(slots: Slots, said: Said) -> Effects:
+def opened(slots: Slots, said: Utterance) -> Effects:
     """Turn a cage into an open ring; leave a gap in any other arrangement."""
     return [{"kind": "open"}] if said.standing.relation == "cage" else [{"kind": "opening"}]
 
 
-def widened(slots: Slots, said: Said) -> Effects:
+def widened(slots: Slots, said: Utterance) -> Effects:
     """Close the ring by standing on the one side that was left free."""
     side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]), "")
     taken = list(said.standing.groups[0].get("sides") or ())
@@ -218,7 +218,7 @@ def widened(slots: Slots, said: Said) -> Effects:
     return [{"kind": "close"}] if filled and {*taken, side} == {*SIDES} != {*taken} else None
 
 
-def cage(slots: Slots, said: Said) -> Effects:
+def cage(slots: Slots, said: Utterance) -> Effects:
     """Make a cage that nothing gets out of; with "as close", at the distance that takes."""
     if "radial" in slots and "asclose" not in slots:
         return None
@@ -228,7 +228,7 @@ def cage(slots: Slots, said: Said) -> Effects:
     return [{"kind": "escape-proof"}]
 
 
-def arrange(slots: Slots, said: Said) -> Effects:
+def arrange(slots: Slots, said: Utterance) -> Effects:
     """Put the same robots in another arrangement."""
     named = list(dict.fromkeys(slots["relation"]))
     named = [r for r in named if r != "around"] or named
@@ -259,7 +259,7 @@ def arrange(slots: Slots, said: Said) -> Effects:
     return edits
 
 
-def _straight(slots: Slots, said: Said) -> Effects:
+def _straight(slots: Slots, said: Utterance) -> Effects:
     """Form a straight line beside the thing; a row would follow its outline, however it bends."""
     named = str((slots.get("flank") or slots.get("side") or [""])[0])
     where = PLACES.get(named) or (None if named else said.standing.beside)
@@ -271,7 +271,7 @@ def _straight(slots: Slots, said: Said) -> Effects:
     return [{"kind": "arrange", "demands": {"relation": "shape", "shape": shape}}]
 
 
-def arranged(slots: Slots, said: Said) -> Effects:
+def arranged(slots: Slots, said: Utterance) -> Effects:
     """Put a given number of robots in another arrangement."""
     n = whole(slots)
     if n is not None and EACH_CORNER.search(said.words):

@@ -8,7 +8,7 @@ from .followup_edits import (
     SIDE_OF,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     listed,
     refuse,
@@ -39,7 +39,7 @@ def whole(slots: Slots) -> int | None:
     return int(number) if number == int(number) and number > 0 else None
 
 
-def add_some(slots: Slots, said: Said) -> Effects:
+def add_some(slots: Slots, said: Utterance) -> Effects:
     """Add a number of robots."""
     n = whole(slots)
     if n is not None and said.count + n > MAX_ROBOTS:
@@ -55,7 +55,7 @@ def add_some(slots: Slots, said: Said) -> Effects:
     return [{"kind": "add", "n": n}]
 
 
-def remove_some(slots: Slots, said: Said) -> Effects:
+def remove_some(slots: Slots, said: Utterance) -> Effects:
     """Remove a number or a share of the robots."""
     n = said.count // SHARES[slots["portion"][0]] if "portion" in slots else whole(slots)
     if n is None:
@@ -67,7 +67,7 @@ def remove_some(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "n": n}]
 
 
-def leave(slots: Slots, said: Said) -> Effects:
+def leave(slots: Slots, said: Utterance) -> Effects:
     """Remove the robots named; the others close up unless the places are to stay empty."""
     robots = [r for named in slots["robots"] for r in named]
     if len(set(robots)) >= said.count:
@@ -76,7 +76,7 @@ def leave(slots: Slots, said: Said) -> Effects:
     return [{"kind": "skip" if slots.has("empty", "stay") else "remove", "robots": robots}]
 
 
-def leave_others(slots: Slots, said: Said) -> Effects:
+def leave_others(slots: Slots, said: Utterance) -> Effects:
     """Remove all robots but those named."""
     slots.has("all")
     words = said.words.lower()
@@ -87,7 +87,7 @@ def leave_others(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "robots": others}] if others else None
 
 
-def leave_side(slots: Slots, said: Said) -> Effects:
+def leave_side(slots: Slots, said: Utterance) -> Effects:
     """Remove the row on one side."""
     side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]))
     rows = [(k, g) for k, g in enumerate(said.standing.groups, 1) if g.get("side") == side]
@@ -97,13 +97,13 @@ def leave_side(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "n": rows[0][1]["robots"], "group": rows[0][0]}]
 
 
-def leave_rest(slots: Slots, said: Said) -> Effects:
+def leave_rest(slots: Slots, said: Utterance) -> Effects:
     """Do nothing for "the rest leaves" if the line has set the number of robots already."""
     counted = any(e["kind"] == "count" for e in said.before)
     return [{"kind": "talk", "about": "already"}] if counted else None
 
 
-def emptied(slots: Slots, said: Said) -> Effects:
+def emptied(slots: Slots, said: Utterance) -> Effects:
     """Remove the team about one of several things."""
     named = str((slots.get("current") or [""])[0])
     groups = list(enumerate(said.standing.groups, 1))
@@ -113,13 +113,13 @@ def emptied(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "n": here[0][1]["robots"], "group": here[0][0]}]
 
 
-def some(slots: Slots, said: Said) -> Effects:
+def some(slots: Slots, said: Utterance) -> Effects:
     """Ask how many, where "some" of the robots are to go elsewhere."""
     slots.used.update(slots)
     return ask(f'How many of them, in "{said.words}"? Say a number.')
 
 
-def count(slots: Slots, said: Said) -> Effects:
+def count(slots: Slots, said: Utterance) -> Effects:
     """Set the number of robots in all, or multiply it."""
     slots.has("toomany", "back", "remove", "less", "only")
     n = (
@@ -141,7 +141,7 @@ def count(slots: Slots, said: Said) -> Effects:
     return None if n is None or not kept or _rearranges(said) else [{"kind": "count", "robots": n}]
 
 
-def _rearranges(said: Said) -> bool:
+def _rearranges(said: Utterance) -> bool:
     """Return whether another arrangement is named beside a number: "six around it".
 
     "Around six" is none; the whole ring is one where robots stand on only a part of it.
@@ -159,13 +159,13 @@ def _rearranges(said: Said) -> bool:
     )
 
 
-def needed(slots: Slots, said: Said) -> Effects:
+def needed(slots: Slots, said: Utterance) -> Effects:
     """Set as many robots as close the ring."""
     slots.has("add", "close", "closeq", "relation", "again")
     return [{"kind": "count", "robots": "held" if slots.has("escape") else "needed"}]
 
 
-def fit(slots: Slots, said: Said) -> Effects:
+def fit(slots: Slots, said: Utterance) -> Effects:
     """Set as many robots as there is room for."""
     slots.has("apart", "spacing", "add")
     spaced: list[Effect] = (
@@ -174,7 +174,7 @@ def fit(slots: Slots, said: Said) -> Effects:
     return [*spaced, {"kind": "count", "robots": "fit"}]
 
 
-def how_many_more(slots: Slots, said: Said) -> Effects:
+def how_many_more(slots: Slots, said: Utterance) -> Effects:
     """Ask how many robots more."""
     return ask(
         "How many more robots?",
@@ -184,12 +184,12 @@ def how_many_more(slots: Slots, said: Said) -> Effects:
     )
 
 
-def how_many_fewer(slots: Slots, said: Said) -> Effects:
+def how_many_fewer(slots: Slots, said: Utterance) -> Effects:
     """Ask how many robots fewer."""
     return ask("How many robots fewer?", "take one robot away", "take two robots away")
 
 
-def swap(slots: Slots, said: Said) -> Effects:
+def swap(slots: Slots, said: Utterance) -> Effects:
     """Swap the places of two robots."""
     robots = [r for named in slots.get("robots", ()) for r in named] + [
         int(n) for n in slots.get("num", ())
@@ -210,7 +210,7 @@ def swap(slots: Slots, said: Said) -> Effects:
     return [{"kind": "swap", "a": robots[0], "b": robots[1]}]
 
 
-def target(slots: Slots, said: Said) -> Effects:
+def target(slots: Slots, said: Utterance) -> Effects:
     """Move the same arrangement to another thing."""
     slots.has("back")
     to = where(slots, said)
@@ -246,7 +246,7 @@ def target(slots: Slots, said: Said) -> Effects:
     )
 
 
-def not_this(slots: Slots, said: Said) -> Effects:
+def not_this(slots: Slots, said: Utterance) -> Effects:
     """Move the same arrangement from this thing to another one."""
     this = str((slots.get("current") or slots.get("thing") or [""])[0])
     if "there" not in slots or (this.startswith("?") and len(said.standing.targets) > 1):
@@ -255,7 +255,7 @@ def not_this(slots: Slots, said: Said) -> Effects:
     return to if isinstance(to, list) else [{"kind": "target", "to": to}]
 
 
-def split(slots: Slots, said: Said) -> Effects:
+def split(slots: Slots, said: Utterance) -> Effects:
     """Move some of the robots to another thing; the rest stays."""
     named = [r for robots in slots.get("robots", ()) for r in robots]
     relation = (slots.get("relation") or ["around"])[0]
@@ -284,7 +284,7 @@ def split(slots: Slots, said: Said) -> Effects:
     return [moved | {"robots": some} | stays]
 
 
-def _number_going(slots: Slots, said: Said) -> int | None:
+def _number_going(slots: Slots, said: Utterance) -> int | None:
     """Return how many robots go elsewhere; None where that is not given, or more than there are."""
     if "portion" in slots:
         part = said.count // SHARES[slots["portion"][0]]
@@ -297,7 +297,7 @@ def _number_going(slots: Slots, said: Said) -> int | None:
     return n if len(set(slots["num"])) == 1 and n is not None and n <= said.count else None
 
 
-def split_ask(slots: Slots, said: Said) -> Effects:
+def split_ask(slots: Slots, said: Utterance) -> Effects:
     """Make two teams; ask where the second is to stand unless only one other thing is known."""
     others = said.standing.others()
     if len(others) == 1:
@@ -308,7 +308,7 @@ def split_ask(slots: Slots, said: Said) -> Effects:
     )
 
 
-def merge(slots: Slots, said: Said) -> Effects:
+def merge(slots: Slots, said: Utterance) -> Effects:
     """Join all teams into one."""
     if len(said.standing.groups) < 2:
         return [{"kind": "talk", "about": "already"}]
@@ -316,7 +316,7 @@ def merge(slots: Slots, said: Said) -> Effects:
     return [{"kind": "merge"} | ({} if to is None else {"to": to})]
 
 
-def merge_to(slots: Slots, said: Said) -> Effects:
+def merge_to(slots: Slots, said: Utterance) -> Effects:
     """Put all robots around one thing, as one team where there are several."""
     if len(said.standing.groups) < 2:
         return target(slots, said)
@@ -324,7 +324,7 @@ def merge_to(slots: Slots, said: Said) -> Effects:
     return [{"kind": "merge", "to": slots["thing"][0]}]
 
 
-def even_out(slots: Slots, said: Said) -> Effects:
+def even_out(slots: Slots, said: Utterance) -> Effects:
     """Even out the gaps that were left."""
     slots.has("rest")
     if slots.get("num", [said.count]) != [said.count]:
@@ -333,20 +333,20 @@ def even_out(slots: Slots, said: Said) -> Effects:
     return [{"kind": "arrange", "demands": demands}]
 
 
-def few_away(slots: Slots, said: Said) -> Effects:
+def few_away(slots: Slots, said: Utterance) -> Effects:
     """Read "two away" as robots to remove: a number this small is not in pixels."""
     few = slots["num"][0] < LEAST_BARE
     return remove_some(slots, said) if few else None
 
 
-def swap_again(slots: Slots, said: Said) -> Effects:
+def swap_again(slots: Slots, said: Utterance) -> Effects:
     """Swap two robots if others were swapped last or the last words were about a swap."""
     asked = [k for c in chunks_of(said.standing.said, said.standing) for k in c.kinds]
     swapped = said.last and said.last[-1]["kind"] == "swap"
     return swap(slots, said) if swapped or "swap" in asked else None
 
 
-def add_one(slots: Slots, said: Said) -> Effects:
+def add_one(slots: Slots, said: Utterance) -> Effects:
     """Add another robot if robots were added last, else ask whether a robot or a thing is meant."""
     if any(e["kind"] == "add" for e in said.last):
         return [{"kind": "add", "n": 1}]

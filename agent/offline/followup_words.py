@@ -254,7 +254,7 @@ class _Reader:
         description = Description(self.plain, start)
         end = description.at
         led = at > 0 and self.plain[at - 1] in (*word_set("before_things"), *ARTICLES)
-        strange = any(map(_tells_otherwise, self.plain[start:end]))
+        strange = any(map(_has_other_meaning, self.plain[start:end]))
         if description.thing.noun and not description.thing.plural and not strange:
             heads = [w for w in self.plain[start:end] if w in word_set("formation_nouns")]
             if heads and not (at > 0 and self.plain[at - 1] in word_set("before_things")):
@@ -318,7 +318,7 @@ def _is_headed(words: Sequence[str]) -> bool:
     )
 
 
-def _tells_otherwise(word: str) -> bool:
+def _has_other_meaning(word: str) -> bool:
     """Return whether a word says something other than which thing it is, or where."""
     if thing_phrase([word], 0) or word in table()["determiners"]:
         return word in PRONOUNS

@@ -74,21 +74,21 @@ DEFAULTS = (("spacing", "even"), ("fit", "normal"))
 def read_followup(words: str, standing: Standing | None) -> Followup:
     """Return what is meant by words about a plan; without a plan, talk or an instruction."""
     if standing is None:
-        return _heard(words, standing)
+        return _read_numbered(words, standing)
     words = with_numbers(words, standing)
     if not standing.places:
-        read = partial(_heard, standing=standing)
+        read = partial(_read_numbered, standing=standing)
         return all_or_those(words, read(words), standing, read)
     told = numbered(standing)
-    robots = meant_by_place(words, told, lambda text: _is_settled(_heard(text, told)))
+    robots = meant_by_place(words, told, lambda text: _is_settled(_read_numbered(text, told)))
     if robots.tied:
         return Followup("ask", text=robots.question, options=robots.options, about="tied")
-    meant = _heard(robots.words, told)
+    meant = _read_numbered(robots.words, told)
     moved = meant.rest or (len(meant.edits) > 1 and any("robot" not in e for e in meant.edits))
     if moved and words != robots.words:
         text = f'Which robot is meant in "{words}" may change on the way. Say it in two turns.'
         return Followup("ask", text=text, about="tied")
-    return all_or_those(words, meant, standing, partial(_heard, standing=told))
+    return all_or_those(words, meant, standing, partial(_read_numbered, standing=told))
 
 
 def _is_settled(followup: Followup) -> bool:
@@ -96,7 +96,7 @@ def _is_settled(followup: Followup) -> bool:
     return followup.kind not in ("ask", "refuse", "instruction") and not followup.things
 
 
-def _heard(words: str, standing: Standing | None) -> Followup:
+def _read_numbered(words: str, standing: Standing | None) -> Followup:
     """Return what is meant by words in which robots have their numbers."""
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
@@ -126,14 +126,14 @@ def _read(words: str, standing: Standing | None) -> Followup:
         return Followup("refuse", text=refused)
     greets = "hello" in line.led or "thanks" in line.led
     if all(is_empty(c) or (greets and set(c.kinds) <= SLIGHT) for c in line.chunks):
-        return _said_nothing(line, there=standing is not None)
-    afresh = _afresh(line)
+        return _without_content(line, there=standing is not None)
+    afresh = _new_instruction(line)
     if afresh:
         return Followup("instruction", text=afresh)
     clauses = line.read()
     if standing is None:
         return _without_plan(line, clauses)
-    return _not_framed(line) if clauses is None else _gathered(line, clauses)
+    return _not_framed(line) if clauses is None else _combined_followup(line, clauses)
 
 
 def commands(words: str, standing: Standing) -> bool:
@@ -147,7 +147,7 @@ def commands(words: str, standing: Standing) -> bool:
     return any(verbs) and understood
 
 
-def _afresh(line: Line) -> str:
+def _new_instruction(line: Line) -> str:
     """Return the instruction after "start over", "" if there is none."""
     if not line.chunks or "restart" not in line.chunks[0].kinds:
         return ""
@@ -155,11 +155,11 @@ def _afresh(line: Line) -> str:
     return line.words[left[0].start :] if len(left) > 1 else ""
 
 
-def _said_nothing(line: Line, *, there: bool) -> Followup:
+def _without_content(line: Line, *, there: bool) -> Followup:
     """Return the follow-up of words without content: talk, or a yes or no to no question."""
     if line.denies:
         options = ("undo", "a bit further out", "a bit closer")
-        return _questioned(line, "What should be different? Nothing was asked.", options)
+        return _as_question(line, "What should be different? Nothing was asked.", options)
     if "thanks" in line.led and "ok " not in line.led:
         return Followup("talk", about="thanks")
     if "hello" in line.led:
@@ -175,17 +175,17 @@ def _without_plan(line: Line, clauses: Sequence[Clause] | None) -> Followup:
     if clauses is None or all(c.frame in INSTRUCTING for c in clauses):
         return Followup("instruction", text=line.words)
     if all(c.frame in WITHOUT_PLAN for c in clauses):
-        return _gathered(line, clauses)
+        return _combined_followup(line, clauses)
     return Followup("refuse", text=NO_PLAN)
 
 
-def _questioned(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
+def _as_question(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
     """Return a question with its options; undo is one only where something was changed."""
     offered = tuple(o for o in options if line.standing.edits or o != "undo")
     return Followup("ask", text=question, options=offered)
 
 
-def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
+def _combined_followup(line: Line, clauses: Sequence[Clause]) -> Followup:
     """Return the follow-up that all clauses together amount to."""
     same = [c for c in clauses if c.frame == "again" and "same" in line.words_of(c.chunks).lower()]
     kept = [c for c in clauses if c not in same] or clauses  # "same again, closer"
@@ -193,7 +193,7 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
     complaints = [c for c in kept if c.frame == "toofar"]
     remedies = [c for c in kept if c not in complaints and _edits(c)]
     if complaints and remedies:  # the remedy says what to do about the complaint
-        plain = _gathered(line, [c for c in kept if c not in complaints])
+        plain = _combined_followup(line, [c for c in kept if c not in complaints])
         told = (*plain.background, *(line.words_of(c.chunks) for c in complaints))
         return replace(plain, background=told)
     effects = [e for c in kept for e in c.effects]
@@ -202,7 +202,7 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
         return Followup("ask", text=unsettled["question"], options=unsettled["options"])
     if unsettled is not None:
         return Followup("refuse", text=unsettled["text"])
-    edits = _once([e for e in effects if e["kind"] not in NO_EDITS])
+    edits = _without_cancelling([e for e in effects if e["kind"] not in NO_EDITS])
     fresh = all(c.frame != "corrected" for c in kept)
     question = _contradiction(line, edits) if fresh else None
     if question is not None:
@@ -228,7 +228,7 @@ def _edits(clause: Clause) -> bool:
     return any(e["kind"] not in (*NO_EDITS, "ask", "refuse", "undo") for e in clause.effects)
 
 
-def _once(edits: list[Effect]) -> list[Effect]:
+def _without_cancelling(edits: list[Effect]) -> list[Effect]:
     """Return the edits without repeats that would cancel out: "flip it, mirror it"."""
     twice = [k for k in range(1, len(edits)) if edits[k] == edits[k - 1]]
     return [e for k, e in enumerate(edits) if k not in twice or e["kind"] not in ("mirror", "swap")]
@@ -260,20 +260,20 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     kept = KEEPS.search(line.words)
     if kept and {*alone} & KEPT[kept["what"].lower()]:
         question = f'"{line.words}" both changes and keeps the {kept["what"]}. Which?'
-        return _questioned(line, question)
+        return _as_question(line, question)
     if {"out", "in"} <= {*alone}:
         says = "says both further out and closer. Which?"
-        return _questioned(line, f'"{line.words}" {says}', ("further out", "closer"))
+        return _as_question(line, f'"{line.words}" {says}', ("further out", "closer"))
     stated = [k for k in ("distance", "count", "sides", "side") if alone.count(k) > 1]
     if stated:
-        return _questioned(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
+        return _as_question(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
     parted = [
         e["to"] for e in edits if e["kind"] == "target" and e.get("robots") and "group" not in e
     ]
     if len(set(parted)) < len(parted):
-        return _questioned(line, f'"{line.words}": which robots are to go, and where? Name them.')
+        return _as_question(line, f'"{line.words}": which robots are to go, and where? Name them.')
     if alone.count("target") > 1:
-        return _questioned(line, f'"{line.words}" names several things. Around which one?')
+        return _as_question(line, f'"{line.words}" names several things. Around which one?')
     return None
 
 
@@ -281,7 +281,7 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
     """Return the follow-up of effects that neither ask nor refuse."""
     kinds = [e["kind"] for e in effects]
     stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*line.excepted]
-    moved = {e.get(name) for e in line.standing.edits for name in _called_in(e)}
+    moved = {e.get(name) for e in line.standing.edits for name in _robot_fields(e)}
     swapped = [e["kind"] for e in line.standing.edits] == ["swap"] and moved & {*stays}
     unchanged = not moved or line.standing.said not in ("", line.standing.words)
     if stays and not edits and unchanged and line.denies:
@@ -290,17 +290,17 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         return Followup("undo", undo=1)
     if stays and not edits:
         if not line.standing.edits:
-            return _questioned(line, f"Robot {listed(stays)} stays. What should the others do?")
+            return _as_question(line, f"Robot {listed(stays)} stays. What should the others do?")
         undo, edits = 1, [dict(e) for e in line.standing.edits]
     if "rest" in kinds:
         moved = ("out", "in", "rotate", "shift", "scale", "spacing")
         if not edits or any(e["kind"] in moved for e in edits):
             which = "which robots are to move, and which stay? Name them by number."
-            return _questioned(line, f'"{line.words}": {which}')
+            return _as_question(line, f'"{line.words}": {which}')
         edits = [e | {"stay": True} if e["kind"] == "target" else e for e in edits]
-    queries = _once([e for e in effects if e["kind"] == "query"])
+    queries = _without_cancelling([e for e in effects if e["kind"] == "query"])
     if len(queries) > 1 or (queries and edits):
-        return _questioned(line, f'"{line.words}" says more than one thing. Which comes first?')
+        return _as_question(line, f'"{line.words}" says more than one thing. Which comes first?')
     query = next(iter(queries), None)
     to = next((e["to"] for e in effects if e["kind"] == "undo" and "to" in e), "")
     others: tuple[Kind, ...] = ("go", "hold", "query")
@@ -318,7 +318,7 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
     )
 
 
-def _called_in(edit: Mapping[str, Any]) -> tuple[str, ...]:
+def _robot_fields(edit: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the fields of an edit in which single robots are named."""
     return ("a", "b") if edit["kind"] == "swap" else ("robot",)
 
@@ -355,7 +355,7 @@ def _not_framed(line: Line) -> Followup:
     demands["shape"]["where"] = demands["shape"]["where"] or line.standing.beside
     if demands["shape"]["where"] is None:
         options = tuple(f"{text} on the {side}" for side in ("left", "right"))
-        return _questioned(line, f'Where by it, in "{text}"?', options)
+        return _as_question(line, f'Where by it, in "{text}"?', options)
     edits: list[Effect] = [{"kind": "arrange", "demands": demands}]
     edits += [{"kind": "count", "robots": reading.robots}] if reading.robots else []
     return Followup("edits", edits=tuple(edits))
@@ -372,12 +372,12 @@ def _not_understood(line: Line) -> Followup:
     quoted = " and ".join(f'"{q}"' for q in dict.fromkeys(quotes or [line.words]))
     if not clear:
         options = ("undo", "a bit further out", "turn it 30 degrees")
-        return _questioned(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
+        return _as_question(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
     words = [[line.words[c.start : c.end] for c in part] for part in clear]
     understood = ", ".join(" ".join(w for w in part if w not in ",.;!?") for part in words)
     advice = "Say it another way, or leave it out."
     question = f'"{understood}" is clear; I do not know what to do with {quoted}. {advice}'
-    return _questioned(line, question, (understood,))
+    return _as_question(line, question, (understood,))
 
 
 def _is_clear(line: Line, chunks: Sequence[Chunk]) -> bool:

@@ -67,8 +67,8 @@ def _next_step(turn: History, before: History) -> Reply:
 
 def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
     """Return the next step for one instruction, which may be a later one of a sequence."""
-    if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
-        return _of_outline(turn[-1])
+    if isinstance(turn[-1], Result) and _ends_in_outline_question(turn[:-1]):
+        return _after_outline_answer(turn[-1])
     placed = with_places(task, turn)
     if isinstance(placed, Reply):
         return placed
@@ -82,7 +82,7 @@ def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
     if isinstance(last, Result) and last.name == "deploy":
         return Reply(text=_after_deploy(task, last, turn))
     if isinstance(last, Result) and last.error:
-        return Reply(text=_left_off(last, turn))
+        return Reply(text=_failure_text(last, turn))
     return _begin(task, turn, before)
 
 
@@ -91,14 +91,14 @@ def _without_agreed(turn: History) -> History:
     kept: list[Message] = []
     for message in turn:
         agreed = isinstance(message, Result) and says_yes(message.text)
-        if agreed and _asks_of_outline(kept):
+        if agreed and _ends_in_outline_question(kept):
             del kept[-3:]
         else:
             kept.append(message)
     return tuple(kept)
 
 
-def _of_outline(answer: Message) -> Reply:
+def _after_outline_answer(answer: Message) -> Reply:
     """Return the reply to an answer other than yes about a doubtful outline."""
     reason = "Nothing was placed, as you said no."
     if not declines(answer.text):
@@ -107,7 +107,7 @@ def _of_outline(answer: Message) -> Reply:
     return _call("report_impossible", {"reason": reason})
 
 
-def _asks_of_outline(messages: Sequence[Message]) -> bool:
+def _ends_in_outline_question(messages: Sequence[Message]) -> bool:
     """Return whether messages end in a question about an outline of too low confidence."""
     refused, asked = (None, None, *messages)[-2:]
     doubted = isinstance(refused, Result) and refused.cause == "low_confidence"
@@ -116,7 +116,7 @@ def _asks_of_outline(messages: Sequence[Message]) -> bool:
 
 def _begin(task: Task, history: History, before: History) -> Reply:
     """Propose a formation, or look for a thing or ask for what is missing."""
-    still_open, chosen = _stated(task, history).open, _narrowed(task, history)
+    still_open, chosen = _restated_instruction(task, history).open, _narrowed(task, history)
     if isinstance(chosen, Reply):
         return chosen
     shown, task = task.pointed, chosen
@@ -146,7 +146,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if found:
         looked_for = prompts_of([(f.candidate, _label(f.wording)) for f in found], before, ids)
         prompts = [*prompts, *looked_for]
-        ids, others = _parted([*ids, *(p["id"] for p in looked_for)], len(named))
+        ids, others = _split_last([*ids, *(p["id"] for p in looked_for)], len(named))
     contract = _in_unit(task, contract_of(reading, robots, ids, others, _refusals(history)))
     if _was_doubted(history):
         contract["reading"] = READING
@@ -176,7 +176,7 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
     agreed = _agreed(task, history)
     if agreed is not None:
         return agreed
-    task, answers = _told_which(task, history)
+    task, answers = _chosen_by_answers(task, history)
     task = replace(task, instruction=restated(task, answers).text)
     several = about_several(task, task.robots or _number_answered(history), history)
     if several is not None:
@@ -187,7 +187,7 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
     return _call(chosen.name, chosen.arguments) if isinstance(chosen, Step) else chosen
 
 
-def _told_which(task: Task, history: History) -> tuple[Task, list[str]]:
+def _chosen_by_answers(task: Task, history: History) -> tuple[Task, list[str]]:
     """Return the task about the pointed things that answers chose, and the other answers."""
     left: list[str] = []
     for question, answer in _answered(history):
@@ -230,7 +230,7 @@ def _things(task: Task, reading: Reading) -> tuple[Reference, ...]:
     return described(reading.things) or described([task.instruction])
 
 
-def _parted(ids: list[str], last: int) -> tuple[list[str], list[str]]:
+def _split_last(ids: list[str], last: int) -> tuple[list[str], list[str]]:
     """Split ids into all but the last `last`, and those."""
     return ids[: len(ids) - last], ids[len(ids) - last :]
 
@@ -244,16 +244,16 @@ def _was_doubted(history: History) -> bool:
     return any(isinstance(m, Result) and m.cause == "doubt" for m in history)
 
 
-def _left_off(result: Result, history: History) -> str:
+def _failure_text(result: Result, history: History) -> str:
     """Return the text for a call that was refused or took too long: what it was about, and why."""
     meant = next(c.arguments for c in calls_in(history) if c.id == result.call_id)
     wording = meant.get("question") or meant.get("reason") or "The thing meant was not looked for."
     return f"{wording} {result.text}"
 
 
-def _stated(task: Task, history: History) -> Restated:
+def _restated_instruction(task: Task, history: History) -> Restated:
     """Return what the instruction and the answers to questions about it say together."""
-    return restated(*_told_which(task, history))
+    return restated(*_chosen_by_answers(task, history))
 
 
 def _answered(history: History) -> list[tuple[str, str]]:
@@ -358,12 +358,14 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
 def _planned(task: Task, plan: dict[str, Any], history: History) -> str:
     noun = "robot has a certified place" if plan["robots"] == 1 else "robots have certified places"
     placed = f"{plan['robots']} {noun} (plan {plan['plan_id']})."
-    return " ".join([*_taken(history), placed, *plan["notes"], *_left_aside(task, history)])
+    return " ".join(
+        [*_candidate_notes(history), placed, *plan["notes"], *_reading_notes(task, history)]
+    )
 
 
-def _left_aside(task: Task, history: History) -> list[str]:
+def _reading_notes(task: Task, history: History) -> list[str]:
     """Return sentences on words that only named the thing, changed nothing, or were left out."""
-    stated = _stated(task, history)
+    stated = _restated_instruction(task, history)
     reading = read_instruction(stated.text, task.metres_per_pixel)
     told = {
         "Read as words for what was pointed at": reading.things if _target_ids(task) else [],
@@ -377,7 +379,7 @@ def _quoted(words: list[str]) -> str:
     return ", ".join(f'"{quote}"' for quote in dict.fromkeys(words))
 
 
-def _taken(history: History) -> list[str]:
+def _candidate_notes(history: History) -> list[str]:
     """Return sentences on which candidates were taken for the things meant, and why."""
     last = next(c for c in calls_in(history)[::-1] if c.name == "propose_formation")
     reasons = located_reasons(history)

@@ -57,7 +57,7 @@ def shown_now(task: Task, before: History) -> tuple[dict[str, Any], ...]:
     return tuple(p for p in task.pointed if p["id"] not in {*old, *task.targets})
 
 
-def heeded(task: Task, followup: Followup) -> Followup:
+def using_pointed(task: Task, followup: Followup) -> Followup:
     """Return the follow-up if its edits use what is newly pointed at, else a new instruction.
 
     It is a refusal if the words are not an instruction.

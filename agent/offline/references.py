@@ -22,7 +22,7 @@ def described(phrases: Sequence[str]) -> tuple[Reference, ...]:
         if words and words[0] not in table()["determiners"]:
             words = ["the", *words]
         found += _described_all(words)
-    return _without_echoes(found)
+    return _without_repeats(found)
 
 
 def _described_all(words: Words) -> list[Reference]:
@@ -203,7 +203,7 @@ def _trailing(words: Words, at: int) -> int:
     return count
 
 
-def _without_echoes(things: Sequence[Reference]) -> tuple[Reference, ...]:
+def _without_repeats(things: Sequence[Reference]) -> tuple[Reference, ...]:
     """Return the things without repeated mentions: "that thing", "the coin" again."""
     telling = [t for t in things if t.query or t.unknown or t.refused or t.noun != "any"]
     kept: list[Reference] = []

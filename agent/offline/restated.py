@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from ...tools.formation.number_words import numbers_in
 from ..first_message import Task
 from .accounting import read_instruction
-from .amending import amended
+from .amending import with_last_count
 from .reading import Reading
 from .several import shares
-from .spelling import instructed
+from .spelling import normalized_instruction
 
 SIDE = re.compile(
     r"\b(?:left|right|top|bottom|upper|lower|above|below|north|south|east|west)\b", re.I
@@ -62,7 +62,7 @@ class Restated:
 
 def restated(task: Task, answers: Sequence[str]) -> Restated:
     """Return a task's instruction as restated by answers, in their order."""
-    said, scale = Restated(instructed(task.instruction)), task.metres_per_pixel
+    said, scale = Restated(normalized_instruction(task.instruction)), task.metres_per_pixel
     for answer in answers:
         if not answer.isdecimal() and not is_question(answer, scale):
             said = _with_answer(said, answer, scale)
@@ -82,8 +82,8 @@ def _with_answer(said: Restated, answer: str, scale: float | None) -> Restated:
     if shares(said.text):
         return replace(said, text=f"{said.text} . {answer}")
     unread, text = [*said.open, *read_instruction(said.text, scale).unread], said.text
-    clear = not (alone.unread or alone.unscaled) and _says(alone)
-    counts = [quote for quote in unread if clear and _said_in(quote) <= _said_in(answer)]
+    clear = not (alone.unread or alone.unscaled) and _is_informative(alone)
+    counts = [quote for quote in unread if clear and _fact_kinds(quote) <= _fact_kinds(answer)]
     for quote in unread:
         text = text.replace(quote, " ", 1)
     return Restated(
@@ -95,7 +95,7 @@ def _with_answer(said: Restated, answer: str, scale: float | None) -> Restated:
 
 def _corrected(text: str, answer: str) -> str | None:
     """Return the instruction corrected by an answer that only replaces a word, else None."""
-    recounted = amended(f"{text}, {answer}")
+    recounted = with_last_count(f"{text}, {answer}")
     if recounted != f"{text}, {answer}":
         return recounted
     plain = CORRECTING.sub("", answer)
@@ -110,11 +110,11 @@ def _corrected(text: str, answer: str) -> str | None:
     return None
 
 
-def _says(reading: Reading) -> bool:
+def _is_informative(reading: Reading) -> bool:
     return bool(reading.robots or reading.group or reading.things or reading.sure)
 
 
-def _said_in(words: str) -> set[str]:
+def _fact_kinds(words: str) -> set[str]:
     """Return the kinds of facts that words contain: "number", "side"."""
     said = {"number": numbers_in(words), "side": SIDE.findall(words)}
     return {kind for kind, found in said.items() if found}

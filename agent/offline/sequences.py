@@ -43,11 +43,11 @@ def in_stages(task: Task, turn: History, before: History, step: Step) -> Reply:
         mine, later = _until_arrived(left)
         reply = step(stage, (first, *mine), before, bool(told))
         if later is None:
-            return _following_on(told, reply)
+            return _with_earlier_texts(told, reply)
         told.append(reply.text)
         before, left = (*before, first, *mine), later
         stage = _next_stage(task, words, mine)
-    return _following_on(told, step(stage, (first, *left), before, bool(told)))
+    return _with_earlier_texts(told, step(stage, (first, *left), before, bool(told)))
 
 
 def _until_arrived(messages: History) -> tuple[History, History | None]:
@@ -70,7 +70,7 @@ def _next_stage(task: Task, words: str, done: tuple[Message, ...]) -> Task:
     return replace(task, instruction=words, robots=robots, targets=tuple(things), pointed=())
 
 
-def _following_on(told: list[str], reply: Reply) -> Reply:
+def _with_earlier_texts(told: list[str], reply: Reply) -> Reply:
     """Return a reply; if it ends the turn or asks, the texts of the stages before come first."""
     said = " ".join(told)
     if not told:

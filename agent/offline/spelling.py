@@ -49,7 +49,7 @@ def _names(word: re.Match[str]) -> bool:
     return before is not None and (not before[1] or (found is not None and found.kind not in HEADS))
 
 
-def instructed(text: str) -> str:
+def normalized_instruction(text: str) -> str:
     """Return a first instruction with short forms expanded and typos in arranging words fixed."""
     for pattern, put in _short_forms():
         text = pattern.sub(put, text)
@@ -108,7 +108,7 @@ def _meant(word: str, names: bool = False) -> str | None:
         return next((w for w in drawn if w in known), None)
     if len(word) < LEAST_CORRECTED or word in known | _everyday() or phrase([word], 0) is not None:
         return None
-    near = [w for w in _telling_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]
+    near = [w for w in _meaningful_words() if len(w) >= LEAST_CORRECTED and _is_slip(word, w)]
     if len(near) != 1 or (names and not _may_be_named(word, near[0])):
         return None
     return near[0]
@@ -123,7 +123,7 @@ def _may_be_named(typed: str, meant: str) -> bool:
 
 
 @cache
-def _telling_words() -> frozenset[str]:
+def _meaningful_words() -> frozenset[str]:
     """Return the words of phrases that are not fillers, and units."""
     idle = {"filler", "thanks", "hello"}
     phrases = [words for words, kinds in lexicon().items() if not idle & set(kinds)]
