@@ -1,7 +1,7 @@
-"""A conversation: turn after turn about one picture, and the commands a person gives beside them.
+"""A conversation: turns about one picture, and the commands that a person gives between them.
 
-Robots move when the person says go, or at once where they asked for that. What "go" is, is read
-here and nowhere else, for every model alike.
+Robots move when the person says go, or at once if they asked for that. What counts as "go" is
+decided only here, in the same way for every model.
 """
 
 import asyncio
@@ -38,24 +38,24 @@ STOP = re.compile(
     r"(?:\W*(?:stop|halt|freeze|please|now|it|the|robots?|all|them|every\w*|team|"
     r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
 )
-"""A sentence that holds the robots at once, whoever else would have read it."""
+"""A sentence that holds the robots at once, before any model reads it."""
 CALLED_OFF = re.compile(
     r"\W*(?:(?:oh|ok|okay|no|well|ah|actually|please|then|just)\b\W*)*"
     r"(?:cancel|never ?mind|forget)(?: (?:about )?(?:it|that|this|the question))?"
     r"(?:\W+(?:please|then|thanks|thank you))*\W*"
 )
-"""A sentence that drops a question; a change is taken back by it only right after it was made."""
+"""A sentence that drops an open question; it takes back a change only right after it was made."""
 STOP_DRIVING = re.compile(r"\b(?:stop+|halt|freeze|hold|wait|abort|cancel|don'?t|whoa|enough)\b")
-"""Words that do so in a short sentence while they drive: to stop once too often costs little."""
+"""Words that hold driving robots if the sentence is short: one stop too many costs little."""
 SHORT = 8
-"""Words of a sentence that is short."""
+"""Most words of a short sentence."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
 DROPS = frozenset({"query", "talk", "undo", "hold", "go"})
-"""Kinds of what is said that are no answer to a question, which is dropped for them."""
+"""Kinds of follow-ups that do not answer an open question but drop it."""
 
 
 class TurnTaker(Protocol):
-    """What works on turns: an `Agent`, whose methods these are."""
+    """What takes turns: an `Agent`, whose methods these are."""
 
     model: Model
 
@@ -81,18 +81,18 @@ class TurnTaker(Protocol):
 
 @dataclass
 class Session:
-    """A conversation, as far as it has come; `run` is its last turn.
+    """A conversation so far; `run` is its last turn.
 
     Attributes:
-        agent: who decides.
-        picture: that it is about.
-        settings: what the person fixed; the number of robots holds for the first turn.
-        pointed: what they point at with their next words.
-        keep_out: what no robot may enter, of the first turn.
-        stored: where it is written, if it is.
+        agent: takes the turns.
+        picture: the picture that the conversation is about.
+        settings: what the person fixed; the number of robots holds for the first turn only.
+        pointed: what the person points at with their next words.
+        keep_out: what no robot may enter, given with the first turn.
+        stored: where the conversation is stored; None if it is not.
         auto: whether simulated robots move as soon as a plan is certified.
-        held: whether they are not to, until the person says go.
-        may_move: whether who speaks may move robots; otherwise only plan.
+        held: whether robots are to wait, despite `auto`, until the person says go.
+        may_move: whether the speaker may move robots, or may only plan.
         begun: how many events the store had before the first turn.
         services: what tools use beside the world, in the first turn.
         run: the last turn; None before the first.
@@ -112,7 +112,7 @@ class Session:
     run: Run | None = None
 
     async def asay(self, words: str, **options: Unpack[SayOptions]) -> Run:
-        """What the person says next: an instruction, a change, a question, an answer, go or stop.
+        """Take the person's next words: an instruction, change, question or answer, go or stop.
 
         Raises:
             InputError: something given cannot be used.
@@ -131,7 +131,7 @@ class Session:
             shown = (*pointed, *keep)
             if not shown and read_followup(words, self._standing(run)).kind not in DROPS:
                 return self._keep(await self._answered(run, words, show))
-            if shown:  # the answer is a point
+            if shown:  # the answer is something pointed at
                 words = f"{run.report.instruction} {words}".strip()
         settings = await self._for_turn(words)
         if run is not None and words != said:  # the same instruction: its numbers still hold
@@ -164,16 +164,16 @@ class Session:
         picture: Picture | None = None,
         show: Show | None = None,
     ) -> Run:
-        """A turn that asks no model: calls of tools by the person.
+        """Take a turn without a model: the person's own tool calls.
 
         Args:
-            words: what it is called in the log, such as /undo.
+            words: the turn's name in the log, such as /undo.
             calls: names of tools and their arguments.
-            text: what is said where there are none.
-            picture: another one from now on.
+            text: the reply where there are no calls.
+            picture: replaces the picture from now on.
 
         Raises:
-            InputError: nothing was said yet.
+            InputError: there was no turn yet.
         """
         agent, run = self._commanded(calls, text), self._run
         moves = any(name == "deploy" for name, _ in calls)
@@ -184,13 +184,13 @@ class Session:
         )
 
     async def aundo(self, steps: int = 1, to: str | None = None) -> Run:
-        """Go back to the plan before, `steps` below 0 forward again; robots stay where they are."""
+        """Undo `steps` changes, or redo if below 0, or go back `to` a plan; robots do not move."""
         arguments = {"steps": steps} if to is None else {"to": to}
         words = f"/undo {to or steps}" if steps > 0 or to else f"/redo {-steps}"
         return await self.aact(words, ("undo", arguments))
 
     async def aimage(self, picture: Picture) -> Run:
-        """Go on with another picture: plans are void, things are measured where they were."""
+        """Go on with another picture: plans are void, things are looked for where they were."""
         run = self._run
         again = ", ".join(t.id for t in run.world.targets)
         text = f"It is {picture.name} from now on. Plans made before are void; say what to do."
@@ -198,11 +198,11 @@ class Session:
         return await self.aact(f"/image {picture.name}", text=text, picture=picture)
 
     async def aedit(self, *edits: dict[str, Any]) -> Run:
-        """Change the plan that stands, by edits as `edit_formation` takes them."""
+        """Change the current plan by edits as `edit_formation` takes them."""
         return await self.aact("/edit", ("edit_formation", {"edits": list(edits)}))
 
     async def ago(self, plan_id: str | None = None, show: Show | None = None) -> Run:
-        """Drive the robots to a plan, the one that stands by default."""
+        """Drive the robots to a plan, by default the current one."""
         run = self._run
         self._check_move()
         plan_id = plan_id or run.world.current
@@ -215,7 +215,7 @@ class Session:
         """Approve one plan, and drive real robots to it.
 
         Raises:
-            InputError: it is not the plan that waits, or who speaks may not move robots.
+            InputError: this plan does not wait for approval, or the speaker may not move robots.
         """
         run = self._run
         self._check_move()
@@ -231,22 +231,22 @@ class Session:
         return await self.aact("stop", text=HELD)
 
     async def ahold(self) -> None:
-        """Stop the fleets at once, whatever else runs."""
+        """Stop the fleets at once, whatever else is running."""
         if self.run is not None:
             services = self.run.context.services
             services.stopped.add(self.run.context.settings.fleet)
             await stop_all(services.fleets.values())
 
     def at(self, run: Run) -> "Session":
-        """The same conversation at a turn of it, to go on differently; it is written nowhere."""
+        """Return the conversation as of a given turn, to go on differently; it is not stored."""
         return replace(self, run=replace(run, stored=None, events=0), stored=None)
 
     def fork(self) -> "Session":
-        """A copy that goes on by itself; what was said so far is in both."""
+        """Return a copy that goes on independently; the conversation so far is in both."""
         return self if self.run is None else self.at(self.run)
 
     def say(self, words: str, **options: Unpack[SayOptions]) -> Run:
-        """See `asay`; the synchronous door, which works inside a running event loop too."""
+        """See `asay`; the synchronous version, which works inside a running event loop too."""
         return self._sync(self.asay(words, **options))
 
     def undo(self, steps: int = 1, to: str | None = None) -> Run:
@@ -267,7 +267,7 @@ class Session:
 
     @property
     def context(self) -> Context:
-        """What tools would work with now; to look and to try, for only turns decide anything."""
+        """The context that tools would get now, to inspect or try; only turns change anything."""
         if self.run is None:
             return Context.of(self.picture, self.settings, services=self.services)
         return replace(self.run.context, world=self.run.world, steps=self.run.steps)
@@ -283,7 +283,7 @@ class Session:
         return run
 
     async def _answered(self, run: Run, words: str, show: Show | None) -> Run:
-        """Give the turn that waits its answer."""
+        """Resume the waiting turn with its answer."""
         outcome = run.outcome
         assert isinstance(outcome, Paused)
         if outcome.call.name == "ask_user":
@@ -303,13 +303,13 @@ class Session:
     def _commanded(
         self, calls: Sequence[tuple[str, dict[str, Any]]] = (), text: str = ""
     ) -> TurnTaker:
-        """The agent with the person's own calls in its model's place."""
+        """Return the agent with the person's own calls in place of its model."""
         agent = copy.copy(self.agent)
         agent.model = Commands(calls, text)
         return agent
 
     def _standing(self, run: Run | None) -> Standing | None:
-        """What follow-ups are read by."""
+        """Return the current plan, by which follow-ups are read; None if there is none."""
         if run is None:
             return None
         facts = standing(replace(run.context, world=run.world, steps=run.steps))
@@ -317,7 +317,7 @@ class Session:
         return None if facts is None else Standing.of(facts, size=size, metres_per_pixel=scale)
 
     async def _for_turn(self, words: str) -> Settings:
-        """What holds in the next turn, as its words say: whether robots move."""
+        """Return the settings of the next turn: its words decide whether robots may move."""
         read = read_followup(words, self._standing(self.run))
         go = read.go or read.kind == "go"
         self.held = (self.held or read.hold or read.kind == "hold") and not go
@@ -328,10 +328,10 @@ class Session:
         return self._fixed(self.run).model_copy(update={"may_deploy": moves})
 
     def _check_move(self) -> None:
-        """Refuse to move robots for who may only plan.
+        """Check that the speaker may move robots.
 
         Raises:
-            InputError: saying so (`not_allowed`).
+            InputError: the speaker may only plan (`not_allowed`).
         """
         if not self.may_move:
             raise InputError(MAY_NOT_MOVE, "not_allowed")
@@ -343,7 +343,7 @@ class Session:
         return run.context.settings.model_copy(update=once)
 
     async def _release(self) -> None:
-        """Lift a stop: the person says go."""
+        """Lift a stop, as the person says go."""
         if self.run is not None:
             services = self.run.context.services
             services.stopped.clear()
@@ -354,7 +354,7 @@ class Session:
         return in_own_loop(self._closing(turn))
 
     async def _closing(self, turn: Coroutine[Any, Any, Run]) -> Run:
-        """A turn after which nothing stays open: connections cannot outlive their event loop."""
+        """Take a turn and close all connections, which cannot outlive their event loop."""
         try:
             return await turn
         finally:
@@ -364,10 +364,10 @@ class Session:
 
 
 async def stop_all(fleets: Iterable[Fleet]) -> None:
-    """Stop each fleet, also where another cannot be.
+    """Stop every fleet, even if another one fails to stop.
 
     Raises:
-        FleetError: the first that could not be.
+        FleetError: of the first fleet that could not be stopped.
     """
     ends = await asyncio.gather(*(fleet.stop() for fleet in fleets), return_exceptions=True)
     for problem in ends:
@@ -376,10 +376,10 @@ async def stop_all(fleets: Iterable[Fleet]) -> None:
 
 
 def is_stop(words: str, *, driving: bool = False) -> bool:
-    """Whether words say to hold the robots at once.
+    """Return whether words say to hold the robots at once.
 
     Args:
-        driving: whether a turn is under way, which may drive them.
+        driving: whether a turn is under way that may be driving them.
     """
     said = words.lower()
     if driving:
@@ -388,7 +388,7 @@ def is_stop(words: str, *, driving: bool = False) -> bool:
 
 
 def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:
-    """Run to its end from code that does not await, inside a running event loop too."""
+    """Run a coroutine to its end from synchronous code, even inside a running event loop."""
     try:
         asyncio.get_running_loop()
     except RuntimeError:

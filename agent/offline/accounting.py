@@ -1,7 +1,7 @@
-"""An instruction in words to the fields of a contract, with an account of every word.
+"""Reader that turns an instruction into fields of a contract and accounts for every word.
 
 Each word is taken by one rule, refers to a thing, is a known word of the command, is background
-that is repeated to the person, or is left unread: then the planner asks and quotes it.
+that is quoted back to the person, or is left unread: then the planner quotes it and asks.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,48 +28,48 @@ from .spans import may_open
 from .tagging import tag, tokens, word_classes
 
 SURE_BACKGROUND, SURE_ALONE, SURE_NUMBER = 0.5, 0.8, 0.8
-"""Least probabilities of background, of a single word that is, and of a clause with a number."""
+"""Least probabilities of background: of a word next to some, of a word alone, and of a number."""
 SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
-"""Share of a sentence's words that are no command from which on all of it is background."""
+"""Least share of non-command words that makes a sentence background; second: a weighty one."""
 REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
-"""What a reason or purpose begins with."""
+"""Words with which a reason or purpose begins."""
 OF_OTHERS = frozenset(("keep_out", "faced", "left_alone", "rings_of"))
-"""Demands in which a phrase for a thing is for another one than the arrangement is about."""
+"""Demands that name a thing other than the one the arrangement is about."""
 LONGEST_CALL = 3
-"""Words of an exclamation that only calls somebody: "Ball boys!"."""
+"""Most words of an exclamation that only addresses somebody: "Ball boys!"."""
 LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "square", "grid"))
-"""What robots may stand in; "a" such thing is never said beside the matter."""
+"""Forms robots may stand in; words that say "a" and one of these are never background."""
 RINGS = frozenset(("ring", "radius", "diameter"))
 """Demands that only a ring can meet."""
 SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
-"""What these can do for a demand that is carried out demands nothing more."""
+"""After "so" one of these begins a purpose, which demands nothing more."""
 STATING = frozenset(
     ("is", "are", "was", "were", "has", "have", "had", "could", "might", "will", "it's", "there's")
 )
-"""A sentence with one of these tells something."""
+"""Words that mark a sentence as a statement."""
 VAGUE = {"nobody", "area"}
-"""Classes with words of every day: a sentence that has no others says no arrangement."""
+"""Classes of everyday words: a sentence with no others does not name an arrangement."""
 ASKED_CLASSES = frozenset(("gap", "avoid", "far", "near", "side", "face", "each", "motion"))
-"""A reason in which a word of these classes stands may be a demand."""
+"""Classes of words that may make a reason a demand."""
 PLACES = {
     "around": ("around", "round", "about"),
     "inside": ("inside", "in", "on", "within", "over", "across", "onto", "into"),
     "along": ("beside", "by", "near", "at", "to"),
 }
-"""Words directly before a thing, and where a form is drawn then."""
+"""Words directly before a thing, by the place they give to a drawn form."""
 WITHIN = frozenset(PLACES["inside"])
 PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
 BEFORE_NOUNS = frozenset(("around", "round", "inside", "within", "along", "beside", "across"))
-"""Words after which a noun without an article is the thing: "8 inside bunker"."""
+"""Words after which a noun without an article names the thing: "8 inside bunker"."""
 LONGEST_NAME = 3
 DEFINITE = frozenset(("the", "this", "that", "these", "those", "my", "our", "your"))
-"""Articles after which a phrase for a thing goes on."""
+"""Determiners that begin a phrase for a thing after a preposition."""
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
-"""Words with a distance that is kept outside the thing."""
+"""Words that make a distance one to keep outside the thing."""
 
 
 def read_instruction(text: str, metres_per_pixel: float | None = None) -> Reading:
-    """Read an instruction in English about a picture of a scale, if it has one."""
+    """Read an English instruction about a picture whose scale may be None, if it is not known."""
     form, span = form_in(text)
     words = tokens(text)
     tagging = tag(words)
@@ -86,7 +86,7 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
 
 
 def _drawn(item: Item, span: tuple[int, int]) -> Item:
-    """The item, or a blank where it is part of the words for a drawn form."""
+    """Return the item, or a blank where it is part of the words for a drawn form."""
     if span[0] <= item.start < span[1]:
         return Item("<f>", item.start, item.end, "demand", 1.0)
     return item
@@ -115,7 +115,7 @@ class _Reader:
         self.scenery = self._scenery()
 
     def read(self) -> Reading:
-        """The reading, with what no rule took."""
+        """Return the reading, including what no rule took."""
         self._settle_meaning()
         for demand in self.demands:
             if not self.fields.apply(demand):
@@ -133,14 +133,14 @@ class _Reader:
         return self.reading
 
     def _count_corners(self) -> None:
-        """As many robots as the words name corners, where they name no robots."""
+        """Take the number of corners as that of robots where the words give none."""
         named = self.fields.corners
         if self.reading.robots is None and len(named) == 1:
             self.reading.robots = named[0]
         self.reading.unread += [f"{n} corners" for n in named if n not in (4, self.reading.robots)]
 
     def _scenery(self) -> list[bool]:
-        """For each item whether its sentence only sets the scene, beside one that commands."""
+        """Return for each item whether its sentence only sets the scene for one that commands."""
         demanded = {k for d in self.demands for k in range(d.first, d.last)}
         scenic: list[bool] = []
         goes_on = False
@@ -158,7 +158,9 @@ class _Reader:
             if goes_on:
                 share = 1.0
             goes_on = sentence[-1].symbol == ";"
-            counts = [k for k in place if self.items[k].quantity and not self._tells(k)]
+            counts = [
+                k for k in place if self.items[k].quantity and not self._is_background_number(k)
+            ]
             if demanded & {*place} or counts:
                 share = 1.0
             ordered = any(d.sets == "robots" and d.first in place for d in self.demands)
@@ -168,7 +170,7 @@ class _Reader:
         return scenic if not all(scenic) else [False] * len(self.items)
 
     def _settle_meaning(self) -> None:
-        """A form that is named is drawn, and a side that is named takes a row."""
+        """Put the arrangement that the demands force first: a named form, a row at a named side."""
         reading = self.reading
         sets = {d.sets for d in self.demands}
         forced = "cage" if self.barring.closes(reading, self.demands) else None
@@ -182,7 +184,7 @@ class _Reader:
             reading.meanings = [(forced, 1.0), *reading.meanings]
 
     def _demanded(self, sets: set[str]) -> str | None:
-        """The arrangement that demands are made of alone, where the command says another."""
+        """Return the arrangement that the demands call for if the command says another, or None."""
         reading = self.reading
         rings = {"rings", "rings_of"}, ("several", "shape"), ("around", "cage", "along")
         besides = {"further"}, ("several", "centre"), ("around", "cage", "corners")
@@ -204,7 +206,7 @@ class _Reader:
         return "along" if "side" in sets and unsure else None
 
     def _surrounds(self) -> bool:
-        """Whether the command has a word that means all round alone: "surround it, four a side"."""
+        """Return whether a command word by itself says all round: "surround it, four a side"."""
         sided = [range(d.first, d.last) for d in self.demands if d.sets == "each_side"]
         return any(
             item.label == "command" and "surround" in self.classes[k]
@@ -213,13 +215,13 @@ class _Reader:
         )
 
     def _stands_off(self) -> bool:
-        """Whether a distance is said as one that is kept outside: "20 px off"."""
+        """Return whether a distance is to be kept outside the thing: "20 px off"."""
         kept = [d for d in self.demands if d.sets == "clearance"]
         said = {i.symbol for d in kept for i in self.items[d.first : d.last]}
         return bool(said & OUTWARD)
 
     def _parts(self) -> bool:
-        """Whether the command says between: the arrangement is no other then."""
+        """Return whether the command says "between", which settles the arrangement."""
         lengths = [range(d.first, d.last) for d in self.demands if d.sets in LENGTHS]
         return any(
             item.symbol == "between"
@@ -229,7 +231,7 @@ class _Reader:
         ) and (dict(self.reading.meanings).get("between", 0) >= MAY_BE)
 
     def _refer(self) -> None:
-        """Phrases for things: the arrangement is about those that no demand took."""
+        """Sort the phrases for things: the arrangement is about those that no demand took."""
         for k, item in enumerate(self.items):
             if item.symbol == "<t>" and (not self.taken[k] or k in self.fields.mentioned):
                 phrase = self._quote(k, self.fields.reaches.get(k, k + 1))
@@ -245,12 +247,12 @@ class _Reader:
                     self.reading.things.append(phrase)
 
     def _demands(self, phrase: str) -> bool:
-        """Whether a phrase for a thing says more than which, or where else robots stand."""
+        """Return whether a phrase for a thing says more than which, or where else robots stand."""
         outside = self.reading.relation not in ("inside", "centre")
         return says_more(phrase) or (outside and says_inside(phrase))
 
     def _place(self) -> str:
-        """What stands before the thing says where a form is drawn."""
+        """Return where a form is drawn, by the word before the thing; "" where it does not say."""
         for k, item in enumerate(self.items):
             before = self.items[k - 1].symbol if k else ""
             if item.symbol in ("<t>", "it", "this", "that"):
@@ -261,7 +263,7 @@ class _Reader:
         return ""
 
     def _count_alone(self) -> None:
-        """A number that stands alone counts the robots where nothing else does."""
+        """Take a number that stands alone as the robot count where nothing else gives one."""
         free = [k for k, i in enumerate(self.items) if i.symbol == "<n>" and not self.taken[k]]
         aside = ("background", "thing")
         free = [k for k in free if all(i.label not in aside for i in self.items[k : k + 2])]
@@ -273,7 +275,7 @@ class _Reader:
                 self.taken[free[0]] = True
 
     def _account(self) -> None:
-        """Sort what nothing took into background and unread."""
+        """Sort the words that nothing took into background and unread."""
         kinds = [self._kind(k) for k in range(len(self.items))]
         for first, last in self._runs():
             within = kinds[first:last]
@@ -288,7 +290,7 @@ class _Reader:
                 sort.append(self._quote(aside[0], aside[-1] + 1))
 
     def _account_unread(self, first: int, last: int) -> None:
-        """A reason changes nothing; what stands after "around the" is the thing, if no other is."""
+        """Sort unread words: a reason is background, what follows "around the" may be the thing."""
         reading = self.reading
         at = next((k for k in range(first, last) if self.items[k].symbol in BEFORE_NOUNS), first)
         if "unread" not in map(self._kind, range(first, at)):
@@ -309,19 +311,19 @@ class _Reader:
             reading.unread.append(self._quote(first, last))
 
     def _is_bare(self, first: int, last: int) -> bool:
-        """Whether words are a noun, perhaps with adjectives, that stand without an article."""
+        """Return whether words are a noun, perhaps with adjectives, without an article."""
         words = [i.symbol for i in self.items[first:last]]
         plain = all(w.isalpha() and w not in WEIGHTY | fillers() for w in words)
         telling = any(self.classes[k] & ASKED_CLASSES - {"motion"} for k in range(first, last))
         return plain and not telling and 0 < len(words) <= LONGEST_NAME
 
     def _only_names(self, first: int, last: int) -> bool:
-        """Whether words can be a phrase for a thing that says nothing else."""
+        """Return whether words can be a phrase for a thing that says nothing else."""
         says = any(i.quantity or i.symbol in NEGATIONS for i in self.items[first:last])
         return not says and not self._demands(self._quote(first, last))
 
     def _gives_reason(self, first: int, last: int) -> bool:
-        """Whether a stretch of words is a reason or purpose that demands nothing more."""
+        """Return whether a stretch of words is a reason or purpose that demands nothing more."""
         words = self.items[first:last]
         if any(i.quantity for i in words):
             return False
@@ -339,7 +341,7 @@ class _Reader:
         return not any(self.classes[k] & ASKED_CLASSES for k in range(first, last))
 
     def _runs(self) -> Iterator[tuple[int, int]]:
-        """Runs of words that no rule took, up to the signs and demands about them."""
+        """Yield runs of words that no rule took, as first and past-the-last index."""
         open_ = [not self.taken[k] and item.symbol not in ENDS for k, item in enumerate(self.items)]
         start = 0
         while start < len(open_):
@@ -351,7 +353,7 @@ class _Reader:
             start = max(end, start + 1)
 
     def _kind(self, k: int) -> str:
-        """Of an item: "" where it is accounted for, else filler, background or unread."""
+        """Return "" for an item that is accounted for, else "filler", "background" or "unread"."""
         item = self.items[k]
         if self.taken[k] or not (
             item.symbol[0].isalnum() or item.symbol in ("<t>", "<n>", "<l>", "<a>", "<s>", "<c>")
@@ -362,7 +364,11 @@ class _Reader:
             return "background"
         if item.quantity is not None:
             return (
-                "" if self._counts_corners(item) else "background" if self._tells(k) else "unread"
+                ""
+                if self._counts_corners(item)
+                else "background"
+                if self._is_background_number(k)
+                else "unread"
             )
         beside = {self.items[n].label for n in (k - 1, k + 1) if n in range(len(self.items))}
         sure = SURE_BACKGROUND if "background" in beside else SURE_ALONE
@@ -377,15 +383,15 @@ class _Reader:
         known = goes_with(item.symbol, self.classes[k], self.reading.relation)
         return "" if known else "unread"
 
-    def _tells(self, k: int) -> bool:
-        """Whether a number stands in a clause that is sure to be background: "come at three"."""
+    def _is_background_number(self, k: int) -> bool:
+        """Return whether a number stands in a clause that is surely background: "come at three"."""
         clause = next(c for c in self.clauses if k in c)
         words = [self.items[j] for j in clause]
         told = all(i.label in ("background", "thing") for i in words if i.symbol not in ENDS)
         return self.items[k].symbol == "<n>" and told and self.items[k].certainty >= SURE_NUMBER
 
     def _counts_corners(self, item: Item) -> bool:
-        """Four corners, one robot at each."""
+        """Return whether a number counts the corners, or the one robot at each."""
         number = item.quantity and item.quantity.whole
         return self.reading.relation == "corners" and number in (1, 4, self.reading.robots)
 

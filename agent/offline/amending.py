@@ -1,4 +1,4 @@
-"""An instruction in which the speaker takes something back, as what is meant in the end."""
+"""Resolves corrections and typing errors in an instruction to what is finally meant."""
 
 import re
 
@@ -23,8 +23,8 @@ RECOUNT = re.compile(
 )
 
 
-def amended(words: str) -> str:
-    """The words with the number of robots that is said last: "9 robots, no wait, ten robots"."""
+def with_last_count(words: str) -> str:
+    """Return the words with the robot count given last: "9 robots, no wait, ten robots"."""
     again = RECOUNT.search(words)
     first = COUNT.search(words)
     if again is None or first is None or again.start() < first.end():
@@ -33,9 +33,9 @@ def amended(words: str) -> str:
     return rest[: first.start()] + again["count"] + rest[first.end("count") :]
 
 
-def typed(words: str) -> str:
-    """An instruction, with slips of the fingers put right where it is understood then."""
-    words = amended(words)
+def repaired(words: str) -> str:
+    """Return an instruction with corrections applied, and typos fixed if it is understood then."""
+    words = with_last_count(words)
     corrected = spelled(words)
     if corrected != words and read_instruction(words).unread:
         return words if read_instruction(corrected).unread else corrected

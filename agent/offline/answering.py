@@ -1,4 +1,4 @@
-"""What the offline planner says in a conversation: who moves, what is measured, small talk."""
+"""The offline planner's replies in a conversation: who moves, what is measured, small talk."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -13,9 +13,9 @@ from .followups import NO_PLAN
 from .standing import Standing
 
 PAIRWISE = ("extent", "pair", "near", "bound")
-"""Questions that take the places of all robots."""
+"""Questions that need the places of all robots."""
 MOST_NAMED = 4
-"""Robots of which each way is told."""
+"""Most robots whose distances are given one by one."""
 HELP = (
     "Say what to change: further out, closer, exactly 20 px away, two more robots, only on the "
     "left, turn it 30 degrees, leave a gap towards the top, the same around the other one, half of "
@@ -26,7 +26,7 @@ ROBOTS_STAY = "The robots do not move back by themselves; say go for that."
 
 
 def talk(followup: Followup, standing: Standing | None, before: History) -> str:
-    """The answer to what asks for no change."""
+    """Return the answer to words that ask for no change."""
     about = followup.about if followup.kind == "talk" else ""
     if about == "help":
         return HELP
@@ -62,7 +62,7 @@ def talk(followup: Followup, standing: Standing | None, before: History) -> str:
 
 
 def _free_sides(group: Mapping[str, Any]) -> str:
-    """Which sides of its thing a group leaves free, as the plan has it."""
+    """Return a sentence on which sides of its thing a group leaves free, according to the plan."""
     thing, taken = listed(group.get("targets", ())), group.get("sides") or [group.get("side")]
     if not {*SIDES} >= {*taken} - {None}:
         return f"The plan keeps no side of {thing} free by name."
@@ -75,7 +75,7 @@ def _free_sides(group: Mapping[str, Any]) -> str:
 
 
 def _why(before: History) -> str:
-    """The last thing that was told, which gives the reason."""
+    """Return the last reply or reported reason of the conversation, as the answer to "why"."""
     for message in reversed(before):
         if isinstance(message, Reply):
             told = message.text or next(
@@ -87,7 +87,7 @@ def _why(before: History) -> str:
 
 
 def said_of_edit(data: Mapping[str, Any], scale: float | None) -> str:
-    """Who moves and how far, after a change."""
+    """Return the reply to a change: who moves, and how far."""
     said = [
         f"{data['robots']} robots have certified places (plan {data['plan_id']}):",
         _moves(data, scale),
@@ -113,7 +113,7 @@ def _moves(data: Mapping[str, Any], scale: float | None) -> str:
 
 
 def said_of_undo(followup: Followup, data: Mapping[str, Any], scale: float | None) -> str:
-    """What stands after steps back or forward."""
+    """Return the reply to steps back or forward: which plan stands now."""
     if data["plan_id"] is None:
         return f"The first plan is taken back: no plan stands. {ROBOTS_STAY}"
     where = (
@@ -123,7 +123,7 @@ def said_of_undo(followup: Followup, data: Mapping[str, Any], scale: float | Non
 
 
 def arrived(data: Mapping[str, Any], scale: float | None) -> str:
-    """What was observed after the robots moved."""
+    """Return the reply on what was observed after the robots moved."""
     if "why" in data:
         return str(data["why"])
     if "followed" in data:
@@ -136,8 +136,8 @@ def arrived(data: Mapping[str, Any], scale: float | None) -> str:
     return f"Not all arrived after {data['corrections']} corrections. {data['reason']}"
 
 
-def said_of_heading(standing: Standing) -> str:
-    """Which way robots look, as the plan that stands has it."""
+def heading_text(standing: Standing) -> str:
+    """Return a sentence on which way robots look, according to the current plan."""
     told: list[str] = []
     for group in standing.groups:
         to = group.get("heading")
@@ -149,8 +149,8 @@ def said_of_heading(standing: Standing) -> str:
     return f"{'; '.join(told)}."
 
 
-def said_of_query(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
-    """The answer to a question about the plan, of what was measured."""
+def query_text(query: Mapping[str, Any], data: Mapping[str, Any], scale: float | None) -> str:
+    """Return the answer to a question about the plan, from what was measured."""
     if "length_px" in data:
         length, width = (length_text(data[name], scale) for name in ("length_px", "width_px"))
         return f"{data['target']} is {length} long and {width} wide."
@@ -240,7 +240,7 @@ def _needed(
 
 
 def _enough(group: Mapping[str, Any]) -> str:
-    """How many robots would close a ring, where a number is known to."""
+    """Return how many robots would close a ring, or that no such number is known."""
     if group["robots_to_close"] is None:
         return "so far from it no number of robots is known to close it"
     return f"{group['robots_to_close']} evenly spaced robots would close it"

@@ -1,6 +1,6 @@
-"""Small talk and reasons around a command: parts of a line that tell something and demand nothing.
+"""Small talk and reasons around a command: parts of a line that state something, demand nothing.
 
-They are taken out only where the rest is understood without them, and are quoted to the person.
+They are removed only where the rest is understood without them, and are quoted to the person.
 """
 
 import re
@@ -19,7 +19,7 @@ PURPOSE = (
     r"for (?:my|our) |so (?:that )?(?:the|my|our|we|i|they|it|someone|people|everyone|you) \w+|"
     r"(?:wide|big|large|far) enough (?:for|to|that)|like (?:in|at|before)"
 )
-"""How a reason or a purpose begins."""
+"""Beginning of a reason or a purpose."""
 TELLING = re.compile(
     rf"^\W*{LEADS}(?:that'?s|that (?:is|was|looks|seems)|it'?s|it (?:is|was|has|looks|seems|will)|"
     r"(?:that|it|this)(?:'?ll| will| would| might| could| makes?| feels?)|"
@@ -33,14 +33,14 @@ TELLING = re.compile(
     rf"(?:the|our|his|her|this|that|some|an?) (?:\w+ ){{1,3}}{VERBS})\b",
     re.IGNORECASE,
 )
-"""How a part begins that tells something."""
+"""Beginning of a part that states something."""
 TELLS_OF = re.compile(
     rf"^\W*{LEADS}(?:there(?:'?s| is| are)|"
     r"(?:the|our|my|a) (?:\w+ ){1,2}(?:is|are|was|were|has|needs?)) "
     r"(?!.*\b(?:better|best|nicer|meant|instead|rather|fine|it)\b)",
     re.IGNORECASE,
 )
-"""What tells of a thing, where the thing alone would be the one to go to."""
+"""Beginning of a statement about a thing that, named alone, would be the one to go to."""
 WRONG = r"(?:close|near|far|tight|wide|big|small|large|crowded|cramped|dense|sparse|loose|many|few)"
 COMPLAINT = re.compile(
     r"\b(?:(?:that|it|this|they|these|those)(?:'?s| is| are|'?re| looks?| seems?)) (?:(?:\w+ )?"
@@ -49,14 +49,14 @@ COMPLAINT = re.compile(
     r"\b(?:is|are) (?:overkill|plenty|excessive|(?:way |far |a bit )?too (?:many|few|much))\b",
     re.IGNORECASE,
 )
-"""What is wrong; how it should be is said beside it."""
+"""A complaint about how things are; another part says how they should be."""
 ORDER = (
     r"(?:(?:so |then )?(?:can|could|would|will) (?:you|we|they)\b|please\b|let'?s\b|"
     r"(?:so |then )?"
     r"(?:make|move|put|turn|take|bring|pull|push|give|add|spread|use|leave|open|close) "
     r"(?:it|them|all|every\w+|the|an?|another|one|two|three|robots?|[0-9]+)\b)"
 )
-"""How a command begins that no sign sets off."""
+"""Beginning of a command that no punctuation sets off."""
 REASON = re.compile(rf"(?<=[a-z0-9])\s+(?=(?:{PURPOSE}|but)\b)", re.IGNORECASE)
 RUN_ON = re.compile(rf"(?<=[a-z])\s+(?={ORDER})", re.IGNORECASE)
 IDLE = re.compile(
@@ -64,21 +64,21 @@ IDLE = re.compile(
     r"\bout of (?:place|line)\b|\blooks?\b(?! (?:at|toward|away|in|out|left|right|up|down))",
     re.IGNORECASE,
 )
-"""What demands nothing where something is told, but would in a command."""
+"""Words that demand nothing in a statement, but would in a command."""
 OF_ONE = re.compile(rf"^\W*{LEADS}.*\b(?:is|stands|looks|seems|sits|was)\b", re.IGNORECASE)
-"""How a part tells something of a robot, which the command calls it."""
+"""Beginning of a statement about a robot that the command then calls "it"."""
 WHY = re.compile(rf"\W*(?:{PURPOSE})\b", re.IGNORECASE)
 IT = re.compile(r"\b(?:it|him|her|that one)\b", re.IGNORECASE)
 WEIGHTY = frozenset(("robots", "px", "m", "angle", "share", "point", "neg", "never"))
-"""Kinds of phrases that are no part of a complaint."""
+"""Kinds of phrases that never occur in a complaint."""
 DEMANDING = word_set("demanding")
-"""Kinds of phrases that demand something, or change what does."""
+"""Kinds of phrases that demand something, or change a demand."""
 
 
 def without_asides(words: str, standing: Standing) -> tuple[str, tuple[str, ...]]:
-    """The words without parts that only tell something, and those parts."""
+    """Return the words without the parts that only state something, and those parts."""
     parts = [p for part in PART.findall(REASON.sub(", ", words)) for p in _run_on(part)]
-    told = [k for k, part in enumerate(parts) if _tells(part, standing)]
+    told = [k for k, part in enumerate(parts) if _only_states(part, standing)]
     kept = "".join(part for k, part in enumerate(parts) if k not in told)
     if parts and not told and OF_ONE.match(parts[0]) and IT.search(kept[len(parts[0]) :]):
         plain = IDLE.sub("", parts[0])
@@ -90,13 +90,13 @@ def without_asides(words: str, standing: Standing) -> tuple[str, tuple[str, ...]
 
 
 def _run_on(part: str) -> list[str]:
-    """A part that tells something and goes on to a command: "that's too far bring it in"."""
+    """Split a part that states something and runs on to a command: "that's too far bring it in"."""
     after = RUN_ON.search(part) if COMPLAINT.search(part) or TELLING.search(part) else None
     return [part[: after.start()] + ", ", part[after.end() :]] if after else [part]
 
 
-def _tells(part: str, standing: Standing) -> bool:
-    """Whether a part tells something and demands nothing."""
+def _only_states(part: str, standing: Standing) -> bool:
+    """Return whether a part states something and demands nothing."""
     found = chunks_of(IDLE.sub("", part), standing)
     kinds = {kind for chunk in found for kind in chunk.kinds}
     asks = part.rstrip().endswith("?") and not WHY.match(part)

@@ -1,6 +1,6 @@
-"""What an instruction says must not happen: nobody gets in, or robots do not do a thing.
+"""What an instruction forbids: that somebody gets in, or that robots do something.
 
-A ring that something must not pass is closed; a demand on robots that is denied is none.
+A ring that something must not pass is closed; a denied demand on robots does not count.
 """
 
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from .reading import Reading
 
 CLOSING = {"enclose", "enclosure", "prevent"}
 MAY_BE = 0.2
-"""Least probability of an arrangement for one of its own words to settle it."""
+"""Least probability of an arrangement at which one of its own words settles it."""
 SUBJECTS = frozenset(("nobody", "none", "nothing", "no", "anything"))
-"""Negations that are what a sentence is about, whoever it is told to."""
+"""Negations that are the subject of a sentence, whoever it is addressed to."""
 ENDS = frozenset(",.;:!?()")
-"""Signs at which a clause, and a stretch of words that was not understood, ends."""
+"""Punctuation that ends a clause, and a stretch of words that was not understood."""
 
 
 class Barring:
@@ -30,7 +30,7 @@ class Barring:
         self.prevented = self._prevented()
 
     def closes(self, reading: Reading, demands: Sequence[Demand]) -> bool:
-        """Whether a command for a ring has a word that closes it: a barrier all round."""
+        """Return whether a command for a ring has words that close it: a barrier all round."""
         if reading.relation != "around":
             return False
         closing = any(
@@ -43,7 +43,7 @@ class Barring:
         return escape or self._prevents(demands) or (closing and likely >= MAY_BE)
 
     def _prevented(self) -> frozenset[int]:
-        """Items that say what must not happen: "so that nobody gets near it"."""
+        """Return the items that say what must not happen: "so that nobody gets near it"."""
         found: set[int] = set()
         for clause in self.clauses:
             start = next((k for k in clause if self._items[k].symbol == "so"), clause.stop)
@@ -55,7 +55,7 @@ class Barring:
         return frozenset(found)
 
     def _prevents(self, demands: Sequence[Demand]) -> bool:
-        """Whether a sentence says that something must not get in or out."""
+        """Return whether a sentence says that something must not get in or out."""
         demanded = {k for d in demands for k in range(d.first, d.last)}
         at = 0
         for sentence in sentences(self._items):
@@ -70,13 +70,13 @@ class Barring:
         return False
 
     def _is_forbidden(self, k: int) -> bool:
-        """Whether robots are told not to do it: "and do not block it"."""
+        """Return whether robots are told not to do what item `k` says: "and do not block it"."""
         clause = next((c for c in self.clauses if k in c), range(0))
         before = [j for j in clause if j < k and self._items[j].symbol in NEGATIONS]
         return any(not self._forbids_others(j, clause) for j in before)
 
     def _forbids_others(self, k: int, sentence: Sequence[int]) -> bool:
-        """Whether a negation is about somebody else: "nobody", but not "they must not touch it"."""
+        """Return whether a negation is of others: "nobody", but not "they must not touch it"."""
         symbol = self._items[k].symbol
         if symbol not in NEGATIONS or symbol == "without":
             return False

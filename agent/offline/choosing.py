@@ -1,7 +1,7 @@
-"""From the words for a thing to one candidate: what to ask the tools, and when to ask the person.
+"""Choice of the candidate that words mean: what to ask the tools, and when to ask the person.
 
-A thing is taken only where measures single it out; else the person chooses among numbered
-candidates. What was asked and answered is read from the history, so nothing is kept here.
+A thing is taken only if measures single it out; otherwise the person chooses among numbered
+candidates. Questions and answers are read from the history, so no state is stored here.
 """
 
 import json
@@ -19,17 +19,17 @@ from .descriptions import Reference
 from .phrases import table
 
 CROWDED, FAINT = 20, 0.6
-"""More things than this, or fainter ones, are rather patches than what people speak of."""
+"""With more things than this, or fainter ones, they are likelier patches than what people mean."""
 MOST_ASKED = 24
-"""Candidates that one question offers: more cannot be told apart on a picture."""
+"""Most candidates that one question offers: more cannot be told apart on a picture."""
 MOST_QUOTED = 200
-"""Characters of an answer that a question repeats."""
+"""Most characters of an answer that a question quotes."""
 POINT = "point at it, with a point, a box or a rough outline"
 
 
 @dataclass(frozen=True)
 class Found:
-    """The candidate that is meant, the words for it and the numbers that say so."""
+    """The candidate that is meant, the words for it and the measured reasons."""
 
     candidate: str
     wording: str
@@ -38,14 +38,14 @@ class Found:
 
 @dataclass(frozen=True)
 class Step:
-    """The call that has to come first."""
+    """A tool call that has to come first."""
 
     name: str
     arguments: dict[str, Any]
 
 
 def find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
-    """The candidates meant, as many as are needed, or what to do to learn them.
+    """Return the candidates meant, as many as are needed, or the call that helps to find them.
 
     A question that is asked again says that the answer chose nothing.
     """
@@ -83,9 +83,9 @@ def _find(things: Sequence[Reference], needed: int, history: History) -> list[Fo
 
 
 def chosen_candidates(history: History, needed: int) -> list[str]:
-    """Candidates that the person chose among those offered, in order.
+    """Return the candidates that the person chose among those offered, in order.
 
-    An answer that names more than are needed, or says which it is not, chooses nothing.
+    An answer that names more than are needed, or says which one it is not, chooses nothing.
     """
     chosen: list[str] = []
     for call in calls_in(history):
@@ -93,7 +93,7 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
             answer = next((m.text for m in history if _answers(m, call)), "").lower()
             numbers = re.findall(r"(?<![-.\w])c?([0-9]{1,4})(?!\.?[0-9])\b", answer)
             rest = set(re.findall(r"[a-z']+", re.sub(r"\bc[0-9]+", " ", answer)))
-            plain = rest <= SMALL | AGREEING | NUMBERING  # else the number may be of anything
+            plain = rest <= SMALL | AGREEING | NUMBERING  # else the number may mean anything
             offered = [
                 f"c{n}" for n in numbers if f"c{n}" in call.arguments["candidates"] and plain
             ]
@@ -121,29 +121,29 @@ EXTREMES: dict[str, tuple[str, int]] = {
     **dict.fromkeys(("big", "bigger", "biggest", "large", "larger", "largest"), ("area", 1)),
     **dict.fromkeys(("small", "smaller", "smallest", "little", "littlest"), ("area", -1)),
 }
-"""Words of an answer that choose by place or size, and what is least or greatest then."""
+"""Words of an answer that choose by place or size: a measure, and 1 for most or -1 for least."""
 
 
 DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
 
 
 def declines(answer: str) -> bool:
-    """Whether an answer is a plain no."""
+    """Return whether an answer is a plain no."""
     return answer.lower().strip(" .!") in DECLINED
 
 
 def agrees(answer: str) -> bool:
-    """Whether an answer is a plain yes."""
+    """Return whether an answer is a plain yes."""
     words = re.findall(r"[a-z']+", answer.lower())
     return bool(words) and set(words) <= AGREEING | SMALL and bool(set(words) & AGREEING)
 
 
 def picked(answer: str, offered: Sequence[dict[str, Any]]) -> list[str]:
-    """The candidate that an answer such as "the left one" or "the second" chooses, if it does.
+    """Return the candidate that "the left one" or "the second" chooses, as a list; empty if none.
 
     Args:
-        answer: lower case.
-        offered: what locate_object said of the candidates, in the order of the question.
+        answer: in lower case.
+        offered: the candidates as locate_object gave them, in the order of the question.
     """
     words = [w for w in re.findall(r"[a-z']+", answer) if w not in SMALL]
     if len(offered) == 1 and agrees(answer):
@@ -168,7 +168,7 @@ def _measure(candidate: dict[str, Any], name: str) -> float:
 
 
 def sightings(ids: Sequence[str], history: History) -> list[dict[str, Any]]:
-    """What was said of candidates when they were found."""
+    """Return what locate_object last said of candidates; ids that it never gave are left out."""
     found: dict[str, dict[str, Any]] = {}
     for message in history:
         if isinstance(message, Result) and message.name == "locate_object" and not message.error:
@@ -186,7 +186,7 @@ def _answers(message: User | Reply | Result, call: Call) -> bool:
 
 
 def _choose_one(thing: Reference, history: History) -> Found | Step:
-    """The one candidate a description means, or what to do to learn it."""
+    """Return the one candidate a description means, or the call that helps to find it."""
     named = thing.named_query if _nouns_are_found(history) else None
     trouble = _trouble(thing)
     if trouble and (named is None or thing.plural):
@@ -196,7 +196,9 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
     if reply is None:
         return Step("locate_object", {"query": query})
     matches = reply["candidates"]
-    alone = reply["things"] == 1 or (matches and matches[0]["id"] == "c1" and _is_told(thing))
+    alone = reply["things"] == 1 or (
+        matches and matches[0]["id"] == "c1" and _fits_most_salient(thing)
+    )
     if reply["settled"] and (named or alone or not _says_little(thing, _is_clear(reply))):
         return Found(matches[0]["id"], thing.wording, tuple(matches[0].get("reasons", ())))
     if matches:
@@ -210,13 +212,13 @@ def _choose_one(thing: Reference, history: History) -> Found | Step:
 
 
 def _nouns_are_found(history: History) -> bool:
-    """Whether the turn's first message says that things can be found by what they are."""
+    """Return whether the turn's first message says that things can be found by their nouns."""
     first = next((m.text for m in history if isinstance(m, User)), None)
     return first is not None and read_task(first).nouns
 
 
 def _pair(thing: Reference, history: History) -> list[Found] | Step:
-    """The two things that a plural means."""
+    """Return the two things that a plural means, or the call that helps to find them."""
     query = {"count": 2} | thing.whole_query
     reply = located(query, history)
     if reply is None:
@@ -228,7 +230,7 @@ def _pair(thing: Reference, history: History) -> list[Found] | Step:
 
 
 def _trouble(thing: Reference) -> str:
-    """Why a description cannot be decided on measures at all, as a question."""
+    """Return a question if measures cannot decide a description at all, else ""."""
     if thing.plural:
         return f'Which one of "{thing.wording}"? Robots are placed about one thing at a time.'
     if thing.refused or (not thing.noun and not thing.query):
@@ -240,11 +242,11 @@ def _trouble(thing: Reference) -> str:
     return ""
 
 
-def _is_told(thing: Reference) -> bool:
-    """Whether the words fit what stands out most for what it is, not for its place among others.
+def _fits_most_salient(thing: Reference) -> bool:
+    """Return whether the words fit the most salient thing for what it is, not for its rank.
 
-    Who adds words nobody understands sees several; of a kind that nothing measures, what is the
-    second from the left or the largest may be of another kind.
+    Unknown words suggest that there are several to tell apart; and if nothing measures the noun,
+    the second from the left or the largest may be of another kind.
     """
     if not thing.query:
         return not thing.unknown and bool(thing.whole_query)
@@ -257,15 +259,15 @@ def _ranked(thing: Reference) -> bool:
 
 
 def _is_clear(reply: dict[str, Any]) -> bool:
-    """Whether the match stands out in a picture that is not full of patches."""
+    """Return whether the match stands out in a picture that is not full of patches."""
     return reply["things"] <= CROWDED and reply["candidates"][0]["salience"] >= FAINT
 
 
 def _says_little(thing: Reference, clear: bool) -> bool:
-    """Whether a noun that measures cannot tell would decide it, alone or by a rank among its kind.
+    """Return whether it takes a noun that cannot be measured, alone or for a rank among its kind.
 
-    A rank among mugs is none among all things, and a full picture of patches settles no rank.
-    Such a thing must be the only one, or fit the noun as the one that stands out most.
+    A rank among mugs is no rank among all things, and a picture full of patches settles no rank.
+    Such a thing must be the only one, or fit the words and stand out most.
     """
     if thing.unknown and not thing.query:
         return True
@@ -273,7 +275,7 @@ def _says_little(thing: Reference, clear: bool) -> bool:
     if thing.noun in ("any", ""):
         return not thing.query or (ranked and not clear)
     nouns = {name for name in thing.whole_query if name not in thing.query}
-    unmeasured = thing.noun != "shape" and nouns <= {"colours", "shade"}  # not all blue is pond
+    unmeasured = thing.noun != "shape" and nouns <= {"colours", "shade"}  # not all blue is a pond
     loose = unmeasured or not clear
     return (thing.weak and not thing.query) or (loose and ranked)
 
@@ -285,7 +287,7 @@ def _ask(question: str, matches: Sequence[dict[str, Any]]) -> Step:
 
 
 def _ask_all(question: str, history: History) -> Step:
-    """The question with all that stands out in the picture."""
+    """Ask the question, offering all that stands out in the picture, once it is located."""
     reply = located(None, history)
     if reply is None:
         return Step("locate_object", {})
@@ -300,11 +302,11 @@ NOTHING_FOUND: dict[str, Any] = {
     "doubt": "",
     "lacking": "",
 }
-"""What locate_object answers where nothing can be told."""
+"""An answer of locate_object that says nothing."""
 
 
 def located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | None:
-    """What locate_object answered to a query, if it was asked."""
+    """Return what locate_object answered to a query; None if it was not called with it."""
     for call in calls_in(history):
         if call.name == "locate_object" and call.arguments.get("query") == query:
             result = next(m for m in history if isinstance(m, Result) and m.call_id == call.id)
@@ -313,7 +315,7 @@ def located(query: dict[str, Any] | None, history: History) -> dict[str, Any] | 
 
 
 def located_reasons(history: History) -> dict[str, list[str]]:
-    """Why each candidate matched what was asked for, by id."""
+    """Return why each candidate matched what was asked for, by id."""
     found: dict[str, list[str]] = {}
     for message in history:
         if isinstance(message, Result) and message.name == "locate_object" and not message.error:
@@ -325,11 +327,11 @@ def located_reasons(history: History) -> dict[str, list[str]]:
 def prompts_of(
     found: Sequence[tuple[str, str]], before: History, taken: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """Candidates and their labels as targets: those of earlier turns keep their ids.
+    """Return candidates and their labels as targets; those of earlier turns keep their ids.
 
     Args:
-        found: candidates and labels.
-        before: the turns before.
+        found: pairs of candidate and label.
+        before: messages of the earlier turns.
         taken: further ids that are in use.
     """
     calls = [c for m in before if isinstance(m, Reply) for c in m.calls]
@@ -345,7 +347,7 @@ def prompts_of(
 
 
 def calls_in(history: History) -> list[Call]:
-    """All that was called, in order."""
+    """Return all tool calls of a history, in order."""
     return [call for m in history if isinstance(m, Reply) for call in m.calls]
 
 

@@ -1,6 +1,6 @@
-"""A line said to a plan, parted into clauses so that a frame takes every phrase of each.
+"""A line said about a plan, split into clauses so that a frame takes every phrase of each.
 
-A clause may be completed by the one before: "left. no wait, right", "and robot 3 too".
+The words before may complete a clause: "left. no wait, right", "and robot 3 too".
 """
 
 import re
@@ -17,7 +17,7 @@ from . import (
     followup_teams,
     followup_turns,
 )
-from .followup_edits import Effect, Effects, Said, ask
+from .followup_edits import Effect, Effects, Utterance, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
 from .followup_words import Chunk, chunks_of, rules
@@ -25,21 +25,21 @@ from .spelling import spelled
 from .standing import Standing
 
 NO_EDITS = ("ask", "refuse", "undo", "go", "hold", "query", "talk", "stay", "rest")
-"""Kinds of effects that change no plan."""
+"""Kinds of effects that do not change a plan."""
 OF_A_TEAM = ("add", "remove", "side", "sides", "opening", "count", "arrange")
-"""Kinds of edits that are for one group; where there are several it is named, or asked."""
+"""Kinds of edits for one group; where there are several, it is named or the person is asked."""
 OF_TEAMS = (
     *("out", "in", "rotate", "mirror", "shift", "scale", "distance", "spacing", "heading"),
     *("close", "open", "escape-proof"),
 )
-"""Kinds of edits that are for all groups where none is named."""
+"""Kinds of edits that apply to all groups where none is named."""
 TALK = ("did", "why", "help", "status", "thanks", "hello")
 AMOUNTS = ("px", "angle", "share", "much", "num", "m")
 REPLACED = (
     *("robots", "dir", "side", "flank", "radial", "thing", "other", "there", "spin", "axis"),
     *("portion", "scale", "apart", "inward", "point", "relation"),
 )
-"""Kinds of phrases that are put in the place of others of the same kind."""
+"""Kinds of phrases that can replace others of the same kind."""
 LEADING = frozenset(
     ("no", "neg", "correction", "yes", "filler", "sep", "thanks", "hello", "instead", "certq")
 )
@@ -54,7 +54,7 @@ OPENERS = r"^(?:(?:so|and|ok|okay|hm+|but|now|well|please|hey|hi|no|yes|then)\b[
 
 @dataclass(frozen=True)
 class Clause:
-    """Phrases that one frame takes, the name of the frame, and what it comes to."""
+    """Phrases that one frame takes, the name of the frame, and its effects."""
 
     chunks: tuple[Chunk, ...]
     frame: str
@@ -62,17 +62,17 @@ class Clause:
 
     @property
     def settled(self) -> bool:
-        """Whether it neither asks nor refuses."""
+        """Whether the clause neither asks nor refuses."""
         return not any(e["kind"] in ("ask", "refuse") for e in self.effects)
 
 
 class Line:
-    """One line that was said.
+    """One line of the person's words.
 
     Attributes:
-        words: with slips of the fingers put right.
+        words: the line with typos fixed.
         chunks: its phrases, without those that lead into it.
-        led: kinds and words of those: "no", "ok", "and".
+        led: kinds and words of the leading phrases: "no", "ok", "and".
         excepted: robots that it excepts: "all but robot 3".
     """
 
@@ -89,32 +89,32 @@ class Line:
         self.chunks = self._without_excepted(self._without_contrast(self._without_lead(found)))
 
     def _leaving(self, chunks: Sequence[Chunk]) -> bool:
-        """Whether robots leave, or the others are said to stay."""
+        """Return whether robots leave, or the others are said to stay."""
         at = [k for k, c in enumerate(chunks) if "rest" in c.kinds]
         stays = any("stay" in c.kinds for k in at for c in chunks[k + 1 : k + 3])
         return stays or any({"leave", "remove"} & set(c.kinds) for c in chunks)
 
     @property
     def adds(self) -> bool:
-        """Whether it goes on from the last change, even after a "no": "no, further still"."""
+        """Whether the line adds to the last change, even after a "no": "no, further still"."""
         return re.search(r"\b(?:still|even|yet)\b", self.words, re.IGNORECASE) is not None
 
     @property
     def denies(self) -> bool:
-        """Whether it begins with "no" or the like."""
+        """Whether the line begins with "no" or the like."""
         return "no " in self.led or "correction" in self.led
 
     def words_of(self, chunks: Sequence[Chunk]) -> str:
-        """What was said there."""
+        """Return the words of some phrases, without surrounding punctuation."""
         said = self.words[chunks[0].start : chunks[-1].end] if chunks else ""
         return " ".join(said.split()).strip(" ,.;!?")
 
     def read(self) -> list[Clause] | None:
-        """Its clauses; None where phrases are left over."""
+        """Return the clauses of the line; None where phrases are left over."""
         return self._after_right() or self._corrected() or self.clauses(self.chunks)
 
     def _after_right(self) -> list[Clause] | None:
-        """What follows a "right," that only leads into it, unless that is an amount."""
+        """Return the clauses after a leading "right,"; None if there is none, or only an amount."""
         if len(self.chunks) < 3 or not {"yes", "dir"} <= set(self.chunks[0].kinds):
             return None
         if "sep" not in self.chunks[1].kinds:
@@ -127,7 +127,7 @@ class Line:
     def clauses(
         self, chunks: Sequence[Chunk], before: tuple[Effect, ...] = ()
     ) -> list[Clause] | None:
-        """The fewest clauses that frames take whole, after those with effects `before`."""
+        """Return the fewest clauses that frames take whole, after those with effects `before`."""
         first = next((k for k, c in enumerate(chunks) if not _is_pure(c)), len(chunks))
         chunks = chunks[first:]
         if all(map(is_empty, chunks)):
@@ -162,17 +162,14 @@ class Line:
         return chunks
 
     def _without_contrast(self, chunks: list[Chunk]) -> list[Chunk]:
-        """The phrases without what is said not to be meant: "to the left, not the right"."""
+        """Return the phrases without those said not to be meant: "to the left, not the right"."""
         robots = any("robots" in c.kinds for c in chunks)
         for k, chunk in enumerate(chunks):
-            no, after, rest = (
-                chunks[k + 1 : k + 2],
-                chunks[k + 2 :],
-                [*chunks[:k], *chunks[k + 2 :]],
-            )
+            no, after = chunks[k + 1 : k + 2], chunks[k + 2 :]
+            rest = [*chunks[:k], *after]
             denied = "neg" in chunk.kinds and set(chunk.kinds) <= {"neg", "clear"} and no
             ended = not after or "sep" in after[0].kinds
-            if denied and ended and any(_alike(no[0], c) for c in rest):
+            if denied and ended and any(_contrasts(no[0], c) for c in rest):
                 return rest[:-1] if rest and "sep" in rest[-1].kinds else rest
             named = self.words[chunk.start : chunk.end].lower().startswith("not ")
             if robots and named and "other" in chunk.kinds:  # "not that one, number six"
@@ -180,11 +177,13 @@ class Line:
         return chunks
 
     def _framed(self, chunks: Sequence[Chunk], before: tuple[Effect, ...]) -> Clause | None:
-        """The clause, where a frame takes it whole and uses all of it."""
+        """Return the clause of the first frame that takes all phrases and uses them, or None."""
         asks, only_asks = self._asks()
         edits = tuple(e for e in before if e["kind"] not in NO_EDITS)
         phrases = tuple((c, self.words[c.start : c.end]) for c in chunks)
-        said = Said(self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words)
+        said = Utterance(
+            self.standing, self.words_of(chunks), edits, self.denies, phrases, self.words
+        )
         for frame in frames():
             if (frame.asks and not asks) or (
                 only_asks and not frame.asks and frame.name not in TALK
@@ -193,7 +192,7 @@ class Line:
             slots = frame.slots(chunks)
             if frame.name in ("thanks", "hello") and not all(map(_is_kind, chunks)):
                 continue
-            effects = None if slots is None else _built(frame, slots, said)
+            effects = None if slots is None else _frame_effects(frame, slots, said)
             changes = any(e["kind"] not in NO_EDITS for e in effects or ())
             if effects and slots is not None and not (changes and slots.unused):
                 teamed = tuple(self._of_team(e, chunks, said.words) for e in effects)
@@ -201,7 +200,7 @@ class Line:
         return None
 
     def _asks(self) -> tuple[bool, bool]:
-        """Whether it may be a question, and whether it can be nothing else."""
+        """Return whether the line may be a question, and whether it can be nothing else."""
         words = self.asking or self.words
         text = re.sub(OPENERS, "", words.lower().lstrip("\"' "))
         telling = next((t for t in rules()["telling"] if re.match(rf"{t}\b", text)), "")
@@ -216,7 +215,7 @@ class Line:
         return leads or marked or open_, leads and not either
 
     def _of_team(self, effect: Effect, chunks: Sequence[Chunk], words: str) -> Effect:
-        """The edit for the group whose thing is named; which one is asked where it has to be."""
+        """Return the edit for the group whose thing is named, or a question if it is not clear."""
         kind, groups = effect["kind"], self.standing.groups
         if len(groups) < 2 or "group" in effect or (kind == "add" and "to" in effect):
             return effect
@@ -235,7 +234,7 @@ class Line:
         return effect
 
     def _corrected(self) -> list[Clause] | None:
-        """What is meant after "no wait", or of what was said last, if this corrects or adds."""
+        """Return what is meant after "no wait", or of the last words if this corrects or adds."""
         own = self.clauses(self.chunks) if self.denies else None
         asked, verb = self.standing.said[-1:] == "?", any("move" in c.kinds for c in self.chunks)
         if own and all(((asked and verb) or c.frame == "allotted") and c.settled for c in own):
@@ -267,7 +266,7 @@ class Line:
         return None if self.adds else self._instead(self._of_words(self.standing.words, after))
 
     def _of_words(self, words: str, after: Sequence[Chunk]) -> list[Clause] | None:
-        """What was said before, with phrases of this line put in."""
+        """Return the clauses of earlier words with phrases of this line put in, or None."""
         line = Line(words, replace(self.standing, words="", said="", edits=()))
         clauses = line.clauses(line.chunks)
         self.asking = line.words
@@ -276,7 +275,7 @@ class Line:
         return found
 
     def _instead(self, found: list[Clause] | None) -> list[Clause] | None:
-        """The clauses as one change that takes the last one back first."""
+        """Return the clauses as one change that takes the last one back first, where relative."""
         kinds = {e["kind"] for c in found or () for e in c.effects}
         if not found or not self.standing.edits or not kinds & {*followup_last.RELATIVE}:
             return found
@@ -285,7 +284,7 @@ class Line:
         return [replace(found[0], effects=tuple(effects), frame="corrected")]
 
     def _for_robots(self, after: Sequence[Chunk]) -> list[Clause] | None:
-        """The last edit for other robots: "and robot 3 too"."""
+        """Return the last edit for other robots: "and robot 3 too"; None if it is for none."""
         robots = [r for c in after for r in c.kinds.get("robots", ())]
         last = dict(self.standing.edits[-1]) if len(self.standing.edits) == 1 else {"kind": ""}
         if not robots or any("stay" in c.kinds for c in after):
@@ -301,9 +300,9 @@ class Line:
     def _substituted(
         self, clauses: Sequence[Clause], after: Sequence[Chunk]
     ) -> list[Clause] | None:
-        """The clauses with phrases in the place of others of their kind, the last that fits."""
+        """Return the clauses with phrases put in the place of others of their kind, or None."""
         for at in range(len(clauses) - 1, -1, -1):
-            chunks = _with(clauses[at], after)
+            chunks = _with_replaced(clauses[at], after)
             clause = None if chunks is None else self._framed(chunks, ())
             if clause is not None and clause.frame == clauses[at].frame:
                 return [*clauses[:at], clause, *clauses[at + 1 :]]
@@ -311,7 +310,7 @@ class Line:
 
 
 def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
-    """The phrases, where "go" is no filler if nothing but fillers stands beside it."""
+    """Return the phrases; "go" is no filler in a part that has nothing but fillers beside it."""
     ends = [k for k, c in enumerate(chunks) if "sep" in c.kinds]
     found = list(chunks)
     for first, last in pairwise([-1, *ends, len(chunks)]):
@@ -322,30 +321,30 @@ def _commanding(chunks: Sequence[Chunk]) -> list[Chunk]:
     return found
 
 
-def _alike(a: Chunk, b: Chunk) -> bool:
-    """Whether two phrases say the same kind of thing, and not the same."""
+def _contrasts(a: Chunk, b: Chunk) -> bool:
+    """Return whether two phrases give different values of the same kind."""
     kinds = [k for k in (*REPLACED, *AMOUNTS) if k in a.kinds and k in b.kinds]
     found = not str(a.kinds.get("thing", "")).startswith("?")
     return found and bool(kinds) and all(a.kinds[k] != b.kinds[k] for k in kinds)
 
 
 def _as_team(chunk: Chunk) -> Chunk:
-    """A phrase for the others as one for all that are not said to stay."""
+    """Return a phrase for the others as one for all robots that are not said to stay."""
     return replace(chunk, kinds={"team": ""})
 
 
 def is_empty(chunk: Chunk) -> bool:
-    """Whether a phrase says nothing by itself."""
+    """Return whether a phrase says nothing by itself."""
     return bool({"filler", "sep"} & set(chunk.kinds)) and set(chunk.kinds) <= SLIGHT
 
 
 def is_part(chunk: Chunk) -> bool:
-    """Whether a phrase only names what a command is about: a robot, an amount, a side, a thing."""
+    """Return whether a phrase only names a part of a command: a robot, amount, side or thing."""
     return bool(set(chunk.kinds) & {*REPLACED, *AMOUNTS, *rules()["common"], "yes", "current"})
 
 
 def _is_kind(chunk: Chunk) -> bool:
-    """Whether a phrase is no more than thanks or a greeting, or says nothing beside one."""
+    """Return whether a phrase is no more than thanks or a greeting, or says nothing beside one."""
     return bool({"thanks", "hello"} & set(chunk.kinds)) or is_empty(chunk)
 
 
@@ -353,12 +352,12 @@ def _is_pure(chunk: Chunk) -> bool:
     return bool({"filler", "sep", "correction"} & set(chunk.kinds)) and set(chunk.kinds) <= PURE
 
 
-def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
-    """The phrases of a clause with others put in; None where one has no place there."""
+def _with_replaced(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
+    """Return the phrases of a clause with others put in; None where one has no place there."""
     chunks, changed = list(clause.chunks), False
     for new in after:
         fits = [k for k in range(len(chunks) - 1, -1, -1) if _stands_for(new, chunks[k])]
-        kinds = set(new.kinds)  # "a bit" is no number, and a number rather one than a length
+        kinds = set(new.kinds)  # prefer a number over "a bit", and the same kind over another
         fits.sort(key=lambda k: ("much" in chunks[k].kinds, kinds.isdisjoint(chunks[k].kinds)))
         at = next(iter(fits), None)
         if at is not None:
@@ -376,14 +375,14 @@ def _with(clause: Clause, after: Sequence[Chunk]) -> list[Chunk] | None:
 
 
 def _stands_for(new: Chunk, old: Chunk) -> bool:
-    """Whether a phrase can be put in the place of another: both say the same kind of thing."""
+    """Return whether a phrase can replace another: both give the same kind of value."""
     amounts = bool(set(new.kinds) & {*AMOUNTS}) and bool(set(old.kinds) & {*AMOUNTS})
     amounts = amounts or ("num" in new.kinds and "robots" in old.kinds)
     return amounts or bool(set(new.kinds) & set(old.kinds) & {*REPLACED})
 
 
-def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
-    """What a frame comes to: of the function of its name."""
+def _frame_effects(frame: Frame, slots: Slots, said: Utterance) -> Effects:
+    """Return the effects of a frame, from the function of the frame's name."""
     if frame.name.startswith("ask_"):
         return followup_turns.asked(slots, said, frame.name.removeprefix("ask_"))
     if frame.name in TALK:
@@ -392,7 +391,7 @@ def _built(frame: Frame, slots: Slots, said: Said) -> Effects:
         *(followup_edits, followup_moves, followup_parts, followup_sides, followup_teams),
         *(followup_last, followup_turns),
     )
-    build: Callable[[Slots, Said], Effects] = next(
+    build: Callable[[Slots, Utterance], Effects] = next(
         getattr(module, frame.name) for module in modules if hasattr(module, frame.name)
     )
     return build(slots, said)

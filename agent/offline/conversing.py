@@ -1,6 +1,6 @@
-"""The offline planner in a conversation: what is said to a plan, tool call by tool call.
+"""The offline planner in a conversation: carries out words about a plan, one tool call at a time.
 
-What was done already is read from the turn's messages, so nothing is kept here. A whole new
+What was done already is read from the turn's messages, so no state is stored here. A whole new
 instruction is left to the planner.
 """
 
@@ -11,26 +11,26 @@ from typing import Any
 
 from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
-from .amending import typed
-from .answering import arrived, said_of_edit, said_of_heading, said_of_query, said_of_undo, talk
+from .amending import repaired
+from .answering import arrived, heading_text, query_text, said_of_edit, said_of_undo, talk
 from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup import Followup
 from .followup_answers import words_meant
 from .followup_things import UNNAMED, pointing_at
 from .followups import commands, read_followup
-from .pointed import heeded, shown_now
+from .pointed import shown_now, using_pointed
 from .sharing import shared
 from .standing import Standing
 
 FEW = 3
-"""Robots of which it is measured exactly which is the nearest."""
+"""Most robots whose exact distances are measured to find the nearest."""
 LEAST_WAY = 0.02
-"""Of the picture's shorter side: the least way that "a bit" is."""
+"""Shortest way that "a bit" is, as a share of the picture's shorter side."""
 
 
 def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task, History]:
-    """The next step of a turn, or the task and messages of a whole new instruction."""
+    """Return the next step of a turn, or the task and messages of a whole new instruction."""
     shown = shown_now(task, before) if task.standing else ()
     task = replace(task, pointed=shown) if shown else task
     standing = _standing(task, before)
@@ -38,7 +38,7 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     words, messages = pointing_at(task.instruction) if new else task.instruction, turn[1:]
     followup = read_followup(words, standing)
     if standing is None and not before and followup.kind != "talk":
-        return replace(task, instruction=typed(words)), turn
+        return replace(task, instruction=repaired(words)), turn
     while followup.kind == "ask" or _goes_on(messages, standing):
         answer, messages = _answer_to(messages)
         if answer is None:
@@ -48,16 +48,16 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
             return Reply(text="Nothing was changed.")
         words = words_meant(words, followup, answer, standing)
         followup = read_followup(words, standing)
-    followup = heeded(task, followup) if shown else followup
+    followup = using_pointed(task, followup) if shown else followup
     if followup.kind == "instruction":
         fresh = words != task.instruction
         said = followup.text if standing else words
-        return replace(task, instruction=typed(said)), (turn[0], *messages) if fresh else turn
-    return _told(followup, _Steps(task, standing, followup, messages, before).next())
+        return replace(task, instruction=repaired(said)), (turn[0], *messages) if fresh else turn
+    return _with_background(followup, _Steps(task, standing, followup, messages, before).next())
 
 
-def _told(followup: Followup, reply: Reply) -> Reply:
-    """The reply, which says at the end of a turn what was read as background."""
+def _with_background(followup: Followup, reply: Reply) -> Reply:
+    """Return the reply; at the end of a turn it also quotes what was read as background."""
     if reply.calls or not followup.background:
         return reply
     quoted = ", ".join(f'"{words}"' for words in followup.background)
@@ -66,7 +66,7 @@ def _told(followup: Followup, reply: Reply) -> Reply:
 
 
 def _standing(task: Task, before: History) -> Standing | None:
-    """The plan that stands, with what this turn points at."""
+    """Return the current plan with what this turn points at; None if there is no plan."""
     if task.standing is None:
         return None
     pointed = tuple(str(p["id"]) for p in task.pointed)
@@ -82,7 +82,7 @@ def _standing(task: Task, before: History) -> Standing | None:
     )
     facts = task.standing
     last: dict[str, Any] = facts.get("last") or {}
-    if said and last.get("words") == begun:  # what was answered to what was asked about them
+    if said and last.get("words") == begun:  # an answer to a question about those words
         facts = facts | {"last": {**last, "words": said[-1]}}
     return Standing.of(
         facts,
@@ -95,7 +95,7 @@ def _standing(task: Task, before: History) -> Standing | None:
 
 
 def _answer_to(messages: History) -> tuple[str | None, History]:
-    """The person's answer to the first question in words, and the messages after it."""
+    """Return the person's first answer to a question, or None, and the messages after it."""
     for k, message in enumerate(messages):
         if isinstance(message, Result) and message.name == "ask_user" and not message.error:
             return message.text, messages[k + 1 :]
@@ -103,7 +103,7 @@ def _answer_to(messages: History) -> tuple[str | None, History]:
 
 
 def _goes_on(messages: History, standing: Standing | None) -> bool:
-    """Whether an answer to which thing is meant chooses none, and is a command of its own."""
+    """Return whether an answer to "which thing?" chooses none and is a command of its own."""
     answer, later = _answer_to(messages)
     until = messages[: len(messages) - len(later)]
     asked = [c for c in calls_in(until) if c.name == "ask_user"]
@@ -114,13 +114,13 @@ def _goes_on(messages: History, standing: Standing | None) -> bool:
 
 
 def _question(followup: Followup) -> str:
-    """The question with its options numbered."""
+    """Return the question with its options numbered."""
     options = [f"{k}: {option}" for k, option in enumerate(followup.options, 1)]
     return f"{followup.text} {'; '.join(options)}." if options else followup.text
 
 
 class _Steps:
-    """What a follow-up takes, one call after another."""
+    """The steps that a follow-up takes, one call after another."""
 
     def __init__(
         self,
@@ -135,7 +135,7 @@ class _Steps:
         self.done = {m.name: m for m in messages if isinstance(m, Result)}
 
     def next(self) -> Reply:
-        """The next call, or the words that end the turn."""
+        """Return the next call, or the text that ends the turn."""
         followup, standing = self.followup, self.standing
         if followup.kind == "refuse":
             return Reply(text=followup.text)
@@ -152,11 +152,11 @@ class _Steps:
         return self._change(standing)
 
     def _query(self, standing: Standing) -> Reply:
-        """Measure what is asked, then say it."""
+        """Measure what the question is about, then answer it."""
         query: dict[str, Any] = dict(self.followup.query or {})
         results = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"]
         if query["about"] == "heading":
-            return Reply(text=said_of_heading(standing))
+            return Reply(text=heading_text(standing))
         shape, scale = self.done.get("describe_shape"), self.task.metres_per_pixel
         measured = results[0] if results else shape
         robots, thing = query.get("robots", []), str(query.get("thing", ""))
@@ -171,7 +171,7 @@ class _Steps:
             data = json.loads(measured.text)
             if query["about"] == "nearest" and thing and standing.targets != [thing]:
                 return self._nearest_to(thing, data, standing, query)
-            return Reply(text=said_of_query(query, data, scale))
+            return Reply(text=query_text(query, data, scale))
         two = len(robots) == 2 and "each" not in query
         if (thing or two) and query["about"] in ("distance", "spacing"):
             ends = [*(f"r{r}" for r in robots), *([thing] if thing else [])]
@@ -184,7 +184,7 @@ class _Steps:
     def _nearest_to(
         self, thing: str, data: dict[str, Any], standing: Standing, query: dict[str, Any]
     ) -> Reply:
-        """Of the few whose places are nearest to another thing's centre the one that is."""
+        """Measure the few robots nearest to (or furthest from) another thing, then answer."""
         centre, sign = (standing.centre or {})[thing], -1 if query["most"] == "furthest" else 1
         rows = sorted(data["each"], key=lambda r: sign * math.dist(r["place"], centre))[:FEW]
         measured = [m for m in self.messages if isinstance(m, Result) and m.name == "measure"][1:]
@@ -192,10 +192,10 @@ class _Steps:
             return _calling("measure", {"a": f"r{rows[len(measured)]['robot']}", "b": thing})
         ways = [json.loads(m.text).get("nearest_px", math.inf) for m in measured]
         seen = [r | {"target": thing, "target_px": w} for r, w in zip(rows, ways, strict=True)]
-        return Reply(text=said_of_query(query, {"each": seen}, self.task.metres_per_pixel))
+        return Reply(text=query_text(query, {"each": seen}, self.task.metres_per_pixel))
 
     def _change(self, standing: Standing) -> Reply:
-        """Take back, find things, measure, edit; then move where asked, and say what came."""
+        """Find things, take back, measure and edit; then move robots if asked, and report."""
         followup, failed = self.followup, self.done.get("edit_formation")
         ids: dict[str, str] = {}
         prompts: list[dict[str, Any]] = []
@@ -242,7 +242,7 @@ class _Steps:
             if measured is None:
                 return _calling("measure", {"a": "plan"})
             assert self.standing is not None
-            edits = [_by_way(edit, json.loads(measured.text), self.standing) for edit in edits]
+            edits = [_as_xy(edit, json.loads(measured.text), self.standing) for edit in edits]
         named = json.dumps(edits)
         for phrase, name in ids.items():
             named = named.replace(json.dumps(phrase), json.dumps(name))
@@ -260,13 +260,13 @@ class _Steps:
         return _calling("edit_formation", arguments)
 
     def _stands_there(self, edit: dict[str, Any]) -> bool:
-        """Whether an edit moves all robots to the thing they stand about."""
+        """Return whether an edit moves all robots to the thing they stand about already."""
         assert self.standing is not None
         alone = len(self.standing.groups) == 1 and "robots" not in edit
         return alone and edit["kind"] == "target" and [edit["to"]] == self.standing.targets
 
     def _failed(self, failed: Result, *, taken_back: bool) -> Reply:
-        """Nothing is changed: what was taken back for it is made again."""
+        """Report or ask why nothing is changed, after redoing what was taken back for the edit."""
         undos = sum(isinstance(m, Result) and m.name == "undo" for m in self.messages)
         found = shared(failed, self.messages) if failed.cause == "no_order" else ""
         if isinstance(found, Step):
@@ -299,7 +299,7 @@ class _Steps:
         return Reply(text=f"{told} Nothing was moved.")
 
     def _later(self, answer: str, told: str) -> Reply:
-        """The second step of a sequence, once it is confirmed; or what is said instead of it."""
+        """Take the second step of a sequence once it is confirmed, or what is said instead."""
         assert self.standing is not None
         confirmed = agrees(answer) or answer.strip(" .") == "1"
         if declines(answer) or answer.strip(" .") == "2":
@@ -327,8 +327,8 @@ class _Steps:
         return Reply(text=f"{told} {text}".strip())
 
 
-def _by_way(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
-    """One robot's way out from its target, or in, as a way in x and y."""
+def _as_xy(edit: dict[str, Any], measured: dict[str, Any], standing: Standing) -> dict[str, Any]:
+    """Return an edit with a robot's way out from its target, or in, turned into x and y, px."""
     if not isinstance(edit.get("by"), dict):
         return edit
     by: dict[str, float] = edit["by"]

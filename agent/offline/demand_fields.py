@@ -1,4 +1,4 @@
-"""Demands of an instruction to fields of the contract, one rule after another."""
+"""Rules that carry demands of an instruction over into fields of the contract."""
 
 import re
 from collections.abc import Sequence
@@ -13,17 +13,17 @@ from .reading import Reading
 from .tagging import tokens, word_classes
 
 FARTHEST = 100_000
-"""Stands for no upper bound of a clearance, px."""
+"""Upper bound of a clearance that has none, px."""
 OPENS = {side: side for side in ("left", "right", "up", "down")} | {"top": "up", "bottom": "down"}
 COUNTING = frozenset(
     ("of", "in", "with", "using", "by", "use", "total", "altogether", "strong", "number")
 )
-"""Words about a number of robots that say nothing of their kind."""
+"""Words beside a number of robots that do not describe the robots."""
 DEGREES = {"right": 0, "bottom": 90, "down": 90, "left": 180, "top": 270, "up": 270}
 LEAST_BARE = 5
-"""Numbers without a unit below this, px, are hardly lengths."""
+"""Least number without a unit that may be a length, px."""
 SEVERAL = re.compile(r"\b(?:two|three|four|five|six|both|pair|[a-z]+[^s\W]s)\b")
-"""What a phrase for more than one thing has in it."""
+"""Words that a phrase for more than one thing contains."""
 FAR_OFF = frozenset(("well", "far", "long", "plenty", "safe", "good"))
 """Words of "stay well away from it" that say how far."""
 LENGTHS = ("clearance", "pitch", "min_spacing", "max_gap", "radius", "diameter", "opening")
@@ -39,11 +39,11 @@ class Fields(Portions):
         self.text = text
         self.scale = metres_per_pixel
         self.corners: list[int] = []  # how many corners the words name
-        self.mentioned: list[int] = []  # items of demands whose phrases name it
-        self.reaches: dict[int, int] = {}  # of phrases for things that go on: past-the-last item
+        self.mentioned: list[int] = []  # items of demands whose phrases may name the target
+        self.reaches: dict[int, int] = {}  # past-the-last item of phrases for things that go on
 
     def apply(self, demand: Demand) -> bool:
-        """Carry a demand over into the reading; False where it cannot be."""
+        """Carry a demand over into the reading; return False if that is not possible."""
         if demand.sets in LENGTHS or demand.sets in ("robot_radius", "robot_diameter"):
             return self._length(demand)
         rule = getattr(self, f"_{demand.sets}", None)
@@ -83,12 +83,12 @@ class Fields(Portions):
         return self._spaced(demand, low, high)
 
     def _length_alone(self, demand: Demand) -> bool:
-        """A length that ends the words about a ring is its distance from the thing."""
+        """Read a length that ends the words about a ring as its distance from the thing."""
         rings = self.reading.relation in ("around", "cage", "corners")
         return rings and self._length(replace(demand, sets="clearance"))
 
     def _every(self, demand: Demand) -> bool:
-        """One robot every so many pixels."""
+        """Read one robot per length as the pitch: "a robot every 20 px"."""
         if any(q.kind == "number" and q.whole != 1 for q in demand.numbers):
             return False
         return self._length(replace(demand, sets="pitch"))
@@ -177,7 +177,7 @@ class Fields(Portions):
         return True
 
     def _other(self, demand: Demand) -> str | None:
-        """The phrase in a demand for a thing that is not the one the arrangement is about."""
+        """Return a demand's phrase for a thing that the arrangement is not about; None if none."""
         within = range(demand.first, demand.last)
         phrases = {k: self._words_of(k) for k, i in enumerate(self.items) if i.symbol == "<t>"}
         mine = [words for k, words in phrases.items() if k not in within]
@@ -204,7 +204,7 @@ class Fields(Portions):
         return self._robots_are(number.whole)
 
     def _note_kind(self, demand: Demand) -> None:
-        """Words for the kind of robot, which change nothing: "24 small yellow robots"."""
+        """Note words for the kind of robot as background: "24 small yellow robots"."""
         named = range(demand.first, demand.last)
         symbols = [self.items[k].symbol for k in named]
         kinds = word_classes(symbols)
@@ -249,16 +249,16 @@ class Fields(Portions):
         return True
 
     def _apart(self, demand: Demand) -> bool:
-        """Robots of a certified plan never touch."""
+        """Accept that robots must not touch: those of a certified plan never do."""
         return True
 
     def _which_of(self, demand: Demand) -> bool:
-        """Which of several things, "the upper of the drums"; of one it would be a part."""
+        """Accept which of several things is meant, "the upper of the drums"; not a part of one."""
         after = self.items[demand.last]
         return SEVERAL.search(self.text[after.start : after.end].lower()) is not None
 
     def _left_alone(self, demand: Demand) -> bool:
-        """Other things, which robots keep off as it is."""
+        """Note other things as background: robots keep off them anyway."""
         self.reading.background.append(self._quote(demand.first, demand.last))
         return True
 
@@ -287,7 +287,7 @@ class Fields(Portions):
         return self._follows_thing(demand)
 
     def _follows_thing(self, demand: Demand) -> bool:
-        """Whether words say which thing, "the van on the left"; they belong to it then."""
+        """Add words that say which thing to the phrase for it: "the van on the left"."""
         at = demand.first - 1
         if at >= 0 and self.items[at].symbol == ",":
             at -= 1

@@ -1,7 +1,7 @@
-"""What an instruction demands beside number, thing and arrangement, by the rules of demands.yaml.
+"""Demands of an instruction beside number, thing and arrangement, by the rules of demands.yaml.
 
-The words are laid out as one line of symbols, in which a phrase for a thing and a quantity are
-one symbol each; a rule takes the symbols that its pattern matches, and no other rule may.
+The words become one line of symbols, in which a phrase for a thing or a quantity is a single
+symbol; a rule takes the symbols that its pattern matches, and no other rule may take them.
 """
 
 import re
@@ -27,11 +27,11 @@ OF_ROBOTS = re.compile(
 )
 """Before a demand: a purpose that says how robots are to stand is no background."""
 SURE_SCENIC = 0.8
-"""Least probability of each word of a sentence that only tells something."""
+"""Least probability of each word of a sentence that only sets the scene."""
 TOLD_OF = ("nobody", "no", "none", "there", "we", "i", "they", "it", "it's", "there's")
-"""What a sentence is about that gives robots no time."""
+"""First words of a sentence in which a time is not meant for the robots."""
 OPENING_CONDITIONS = ("unless", "until", "if", "once", "as", "provided")
-"""First words of a sentence that makes all of them conditional."""
+"""First words that make the instruction conditional."""
 WRAPPED = re.compile(r"\s*\|\s*")
 SENTENCE_ENDS = (".", "!", "?", ";")
 
@@ -42,9 +42,9 @@ class Item:
 
     Attributes:
         symbol: the word, lower case, or <t>, <n>, <l>, <a>, <s>, <c>.
-        start, end: where it stands in the instruction.
-        label, certainty: what it is there for, one of tagging.LABELS, and how surely.
-        quantity: the number or length; None of other symbols.
+        start, end: its position in the instruction, in characters.
+        label, certainty: its role, one of tagging.LABELS, and the probability of that.
+        quantity: the number or length; None for other symbols.
     """
 
     symbol: str
@@ -57,15 +57,15 @@ class Item:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a rule found.
+    """A demand that a rule found.
 
     Attributes:
-        sets: what it is about, as demands.yaml calls it.
-        value: what the rule itself says, such as "towards"; "" where the words say it.
+        sets: what it is about, as named in demands.yaml.
+        value: the value that the rule gives, such as "towards"; "" where the words give it.
         sides: left, right, top, bottom, up, down, in the order of the words.
         quantity: the number or length that was named, if one was.
-        numbers: all numbers in it.
-        bound: "least", "most" or "", how the quantity bounds.
+        numbers: all quantities in it.
+        bound: whether the quantity is the "least" or the "most"; "" for neither.
         first, last: its items, first and past-the-last index.
     """
 
@@ -80,7 +80,7 @@ class Demand:
 
 
 def items_of(text: str, words: Sequence[Token], tagging: Tagging) -> tuple[Item, ...]:
-    """The symbols of an instruction; phrases for things that touch are one."""
+    """Return the symbols of an instruction; adjacent words for things become one."""
     labels = dict(zip((w.start for w in words), tagging.labels, strict=True))
     plain = [q for q in quantities_in(text) if _is_plain(q, words, labels)]
     found: list[Item] = []
@@ -100,7 +100,7 @@ def items_of(text: str, words: Sequence[Token], tagging: Tagging) -> tuple[Item,
 
 
 def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]) -> bool:
-    """Whether it is no part of a phrase for a thing, and no "one" that stands for a noun."""
+    """Return whether it is not part of a phrase for a thing, nor a "one" in place of a noun."""
     inside = [labels[w.start] for w in words if quantity.start <= w.start < quantity.end]
     after = next((w.text for w in words if w.start >= quantity.end), "")
     following = [w.text for w in words if w.start >= quantity.end][: 3 if after.isalpha() else 0]
@@ -115,7 +115,7 @@ def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]
 
 
 def demands_in(items: Sequence[Item]) -> tuple[Demand, ...]:
-    """What the rules find, each item in one demand at most; in the order of the rules."""
+    """Return the demands that rules find, in their order; an item is in one demand at most."""
     line = _Line(items)
     free = [True] * len(items)
     found: list[Demand] = []
@@ -133,9 +133,9 @@ def demands_in(items: Sequence[Item]) -> tuple[Demand, ...]:
 
 
 def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
-    """Why an instruction is no order to place robots now: a kind, and where the words stand.
+    """Return why an instruction is no order to place robots now: kinds, and positions of the words.
 
-    What is background stops nothing, unless it denies or calls off.
+    Background does not count, except for the kinds in ALWAYS, such as a negation.
     """
     found: list[tuple[str, int, int]] = []
     parts = sentences(items)
@@ -162,27 +162,27 @@ def stops_in(items: Sequence[Item]) -> tuple[tuple[str, int, int], ...]:
 
 
 def word_list(name: str) -> frozenset[str]:
-    """A list of words of demands.yaml."""
+    """Return a list of words of demands.yaml."""
     return frozenset(map(str, _table()[name]))
 
 
 def says_more(phrase: str) -> bool:
-    """Whether a phrase for a thing says more than which thing, such as "every coin"."""
+    """Return whether a phrase for a thing says more than which thing, such as "every coin"."""
     return any(pattern.search(phrase.lower()) for pattern in _patterns("in_things"))
 
 
 def says_others(phrase: str) -> bool:
-    """Whether a phrase for a thing says that it is not meant: "the grey ones don't matter"."""
+    """Return whether a phrase says that the thing is not meant: "the grey ones don't matter"."""
     return any(pattern.search(phrase.lower()) for pattern in _patterns("others"))
 
 
 def says_inside(phrase: str) -> bool:
-    """Whether a phrase for a thing is about its inside: "the inside of the box"."""
+    """Return whether a phrase for a thing is about its inside: "the inside of the box"."""
     return any(pattern.search(phrase.lower()) for pattern in _patterns("insides"))
 
 
 def is_part(phrase: str) -> bool:
-    """Whether a phrase names a part by which a distance from a thing is told: "the wings"."""
+    """Return whether a phrase names a part from which distances are given: "the wings"."""
     parts = re.sub(WRAPPED, "|", _table()["words"]["SURFACE"])
     return re.fullmatch(f"(?:(?:the|its|their) )?(?:{parts})", phrase.lower()) is not None
 
@@ -193,7 +193,7 @@ def _patterns(name: str) -> tuple[re.Pattern[str], ...]:
 
 
 def sentences(items: Sequence[Item]) -> list[list[Item]]:
-    """The items, sentence by sentence."""
+    """Return the items, sentence by sentence."""
     found: list[list[Item]] = [[]]
     for item in items:
         found[-1].append(item)
@@ -203,7 +203,7 @@ def sentences(items: Sequence[Item]) -> list[list[Item]]:
 
 
 class _Line:
-    """The symbols as one text, and which of them a match covers."""
+    """The symbols as one text, to find which of them a match covers."""
 
     def __init__(self, items: Sequence[Item]) -> None:
         self.text = " ".join(i.symbol for i in items)
@@ -214,7 +214,7 @@ class _Line:
             at += len(item.symbol) + 1
 
     def items_of(self, match: re.Match[str], group: str | int = 0) -> tuple[int, int]:
-        """First and past-the-last index of the items in a group of a match."""
+        """Return the first and past-the-last index of the items in a group of a match."""
         start, end = match.span(group)
         covered = [k for k, at in enumerate(self._starts) if start <= at < end]
         return (covered[0], covered[-1] + 1) if covered else (0, 0)
@@ -228,7 +228,7 @@ class _Rule:
 
     @property
     def measures(self) -> bool:
-        """Whether its patterns say which number is the length."""
+        """Whether the rule's patterns say which number is the length."""
         return any("{LENGTH}" in p.pattern or "(?P<l" in p.pattern for p in self.patterns)
 
 
@@ -290,7 +290,7 @@ def _stops() -> tuple[tuple[str, re.Pattern[str]], ...]:
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:
-    """The pattern with its lists written out, between whole symbols, its groups told apart."""
+    """Compile a pattern with its lists expanded, matching whole symbols, its groups numbered."""
     words = _table()["words"]
     while (name := re.search(r"\{([A-Z_]+)\}", pattern)) is not None:
         pattern = pattern.replace(name[0], f"(?:{re.sub(WRAPPED, '|', words[name[1]])})")

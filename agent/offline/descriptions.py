@@ -1,4 +1,4 @@
-"""One description, word by word, into what is measured: "the small red one left of the pond"."""
+"""Parser of one description into what is measured: "the small red one left of the pond"."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -7,22 +7,22 @@ from .idioms import comparison, difference, position
 from .phrases import HEADS, STOPS, Phrase, Words, phrase, table
 
 STRANGERS = 3
-"""Words not known that may stand between "the" and a noun that is."""
+"""How far a known noun may be behind an unknown word, in words."""
 
 
 @dataclass
 class Reference:
-    """One thing spoken of.
+    """One thing that words describe.
 
     Attributes:
-        said: the words.
+        wording: the words.
         query: fields of a Query that say how it looks and where it is.
         noun: the kind of thing, a key of the noun table, or "shape"; "" where it is not known.
-        called: the noun as it was said, known or not; "" where there is none.
+        called: the noun in the person's words; "" where there is none.
         weak: whether the noun says little that can be measured.
         plural: whether several things are meant.
         unknown: words about it that are not understood.
-        refused: words that change who is meant in a way not followed here, or "".
+        refused: words that change which thing is meant in an unsupported way, or "".
     """
 
     wording: str = ""
@@ -36,12 +36,12 @@ class Reference:
 
     @property
     def strange(self) -> bool:
-        """Whether nothing of it is understood."""
+        """Whether nothing about the thing is understood."""
         return not self.noun and not self.query
 
     @property
     def named_query(self) -> dict[str, Any] | None:
-        """All that is said of it where nouns are found; None where more is said, or no noun."""
+        """The query with its noun, for detectors; None without one or if more is not understood."""
         only = {"", self.called}
         if not self.called or self.refused not in only or not only.issuperset(self.unknown):
             return None
@@ -49,7 +49,7 @@ class Reference:
 
     @property
     def whole_query(self) -> dict[str, Any]:
-        """All that is measured: for its noun (a coin is round) and for what is said of it."""
+        """The query for all that is measured: for the noun (a coin is round) and for the words."""
         merged = dict(table()["nouns"].get(self.noun, {}).get("query", {}))
         for name, value in self.query.items():
             joined = name in ("traits", "picks", "relations") and name in merged
@@ -58,12 +58,12 @@ class Reference:
 
 
 class Description:
-    """Reads a description that begins at a place in the words.
+    """Reads a description that begins at a given word.
 
     Attributes:
         thing: what was understood.
-        at: where the description ends.
-        closed: whether something of the thing follows, as in "the boat's left side".
+        at: index of the word after the description.
+        closed: whether a part of the thing follows, as in "the boat's left side".
     """
 
     def __init__(self, words: Words, at: int, nested: bool = False) -> None:
@@ -95,7 +95,7 @@ class Description:
         )
 
     def _joined(self) -> bool:
-        """A comma or "and" between adjectives."""
+        """Take a comma or "and" between adjectives."""
         following = phrase(self.words, self.at + 1)
         adjective = following is not None and following.kind not in ("skip", "relations", "noun")
         if self._headed or not adjective:
@@ -104,7 +104,7 @@ class Description:
         return True
 
     def _count(self) -> bool:
-        """A number of things: the two red ones, the left one of the three."""
+        """Take a number of things: the two red ones, the left one of the three."""
         count = table()["counts"].get(self.words[self.at])
         if count is None or (self._headed and not self._partitive):
             return False
@@ -113,7 +113,7 @@ class Description:
         return True
 
     def _relation(self) -> bool:
-        """Left of the pond, between the plate and the coin."""
+        """Take a relation to other things: left of the pond, between the plate and the coin."""
         found = phrase(self.words, self.at)
         if found is None or found.kind != "relations":
             return False
@@ -121,7 +121,7 @@ class Description:
         end = self.at + found.length
         if self._nested and self.words[end : end + 1] == [
             "the"
-        ]:  # a chain: which thing it hangs on is not decided here
+        ]:  # in a chain it is unclear which thing a relation is of
             self.thing.refused = " ".join(self.words[self.at : end])
             return False
         for _ in range(2 if found.value == "between" else 1):
@@ -140,13 +140,13 @@ class Description:
         return True
 
     def _compared(self) -> bool:
-        """Than any of the others: what a superlative says too."""
+        """Take "than any of the others", which only repeats a superlative."""
         length = comparison(self.words, self.at)
         self.at += length
         return length > 0
 
     def _hint(self) -> bool:
-        """Unlike the others in colour; in the upper left corner of the picture."""
+        """Take an idiom: unlike the others in colour; in the upper left corner of the picture."""
         found = max(
             filter(None, (difference(self.words, self.at), position(self.words, self.at))),
             key=lambda hint: hint[1],
@@ -178,7 +178,7 @@ class Description:
         return True
 
     def _relative(self) -> bool:
-        """That, which: only when something known follows."""
+        """Take "that" or "which", but only if something known follows."""
         words, at = self.words, self.at + 1
         if words[self.at] not in table()["relative"]:
             return False
@@ -188,7 +188,7 @@ class Description:
         return True
 
     def _apposed(self) -> bool:
-        """The article in "which is the largest"."""
+        """Take the article in "which is the largest"."""
         words, at = self.words, self.at
         following = phrase(words, at + 1)
         ranked = following is not None and following.kind in ("picks", "ordinal")
@@ -205,7 +205,7 @@ class Description:
         return True
 
     def _head(self, found: Phrase) -> bool:
-        """Take a noun, unless there is one already: then it is another thing's."""
+        """Take a noun, unless there is one already: then it belongs to another thing."""
         thing = self.thing
         open_still = thing.noun == "shape" or (self._partitive and thing.noun in ("", "any"))
         if self._headed and not open_still:
@@ -242,7 +242,7 @@ class Description:
             picks.append(pick)
 
     def _unknown(self) -> bool:
-        """A word that is not known, with a noun that is close after it."""
+        """Take an unknown word if a known noun follows closely."""
         words = self.words
         if self._headed or words[self.at] in table()["follow"]:
             return False
@@ -260,6 +260,6 @@ class Description:
 
 
 def _unclear(thing: Reference) -> bool:
-    """Whether another thing, named to say where one is, is not understood itself."""
+    """Return whether another thing, named to say where one is, is not understood itself."""
     nothing = not thing.whole_query or not thing.noun
     return bool(thing.refused or thing.plural or nothing or "relations" in thing.query)

@@ -1,4 +1,4 @@
-"""From what was read to a contract, or to the question that has to be asked first."""
+"""The contract for what was read, or the question that has to be asked first."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,7 +12,7 @@ EXAMPLES = "around it, at its corners, along its left side, inside it, between t
 UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
 LEAST_CAGE = 3
 LIKELY_PLACE = 0.3
-"""Least probability of another arrangement for it to say where a form is drawn."""
+"""Least probability of another arrangement at which it says where a form is drawn."""
 NAMES = {
     "around": "around it",
     "cage": "in a closed ring around it",
@@ -24,11 +24,11 @@ NAMES = {
     "shape": "in a form drawn by it",
     "at": "at a point",
 }
-"""Arrangements as questions name them."""
+"""Names of arrangements in questions."""
 
 
 def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
-    """What has to be asked before anything is looked for; None where all is settled."""
+    """Return what to ask before any thing is looked for; None where all is settled."""
     return (
         _foreign(reading)
         or _stopped(reading)
@@ -41,7 +41,7 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
 
 
 def would_do(task: Task, reading: Reading, robots: int) -> bool:
-    """Whether all but words that were left unread is settled, so that a contract can be shown."""
+    """Return whether all but some unread words is settled, so that a contract can be shown."""
     settled = not (reading.stops or reading.unscaled or _unsettled(reading))
     settled = settled and _too_few(reading, robots) is None
     settled = settled and not (reading.others or reading.faced or which_things(task, reading))
@@ -49,20 +49,20 @@ def would_do(task: Task, reading: Reading, robots: int) -> bool:
 
 
 def things_needed(reading: Reading) -> int:
-    """How many things the arrangement is about."""
+    """Return how many things the arrangement is about."""
     return 2 if reading.relation == "between" else 1
 
 
 def contract_of(
     reading: Reading, robots: int, targets: list[str], others: list[str], attempt: int = 0
 ) -> dict[str, Any]:
-    """The contract as arguments of propose_formation.
+    """Return the contract as arguments of propose_formation.
 
     Args:
-        reading: settled.
-        robots: in all.
+        reading: of the instruction, with nothing left to ask.
+        robots: total number.
         targets: ids of what the arrangement is about.
-        others: ids of what to stay clear of; of a row whose side faces one, that one is the last.
+        others: ids of what to stay clear of; the last is what a row faces, if it faces one.
         attempt: how many places beside the target had no room for a form.
     """
     fields = {"spacing": "even", "fit": "normal"} | reading.group
@@ -123,7 +123,7 @@ def _related(reading: Reading, basics: dict[str, Any]) -> dict[str, Any]:
 
 
 def _drawn(reading: Reading, basics: dict[str, Any], attempt: int) -> dict[str, Any]:
-    """The shape of a form with its place by the target; takes side and opens out of the group."""
+    """Return a form's shape with its place by the target; pops side and opens from `basics`."""
     assert reading.form is not None
     shape = reading.form.shape | {"where": place_of(reading, attempt)}
     if "opens" in basics:
@@ -133,7 +133,7 @@ def _drawn(reading: Reading, basics: dict[str, Any], attempt: int) -> dict[str, 
 
 
 def place_of(reading: Reading, attempt: int) -> str | None:
-    """Where by the target a form is drawn; None where the words do not settle it."""
+    """Return where by the target a form is drawn; None where the words do not settle it."""
     assert reading.form is not None
     side = reading.group.get("side")
     if side is not None:
@@ -220,7 +220,7 @@ def _too_few(reading: Reading, robots: int | None) -> str | None:
 
 
 def which_things(task: Task, reading: Reading) -> str | None:
-    """What to ask where more or fewer things are pointed at than the arrangement is about."""
+    """Return what to ask if the number of things pointed at does not fit; None if it does."""
     pointed = list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
     needed = things_needed(reading)
     if reading.others and len(pointed) == needed + len(reading.others):

@@ -1,7 +1,7 @@
-"""Words to a drawn form, or to a side that faces another thing: "a star around it", "spell A".
+"""Finds the drawn form that an instruction names: "a star around it", "spell A".
 
-Only plain wordings are read, and taken out of the instruction; what is left says where and how
-many. What is not read stays in, and the planner says that it does not carry it out.
+Only plain wordings are read, and taken out of the instruction; the rest says where and how many.
+What is not read stays in, and the planner says that it does not carry it out.
 """
 
 import re
@@ -25,18 +25,18 @@ COUNT = rf"(?:[0-9]{{1,4}}|\b(?:{CARDINALS})(?:[- ](?:{CARDINALS}))?\b)"
 CORNERED = {"triangle": 3, "square": 4, "pentagon": 5, "hexagon": 6, "octagon": 8}
 SIDES = {"left": "left", "right": "right", "top": "above", "bottom": "below"}
 BESIDE = ("right", "left", "below", "above")
-"""Where a form beside a thing is tried, one place after another."""
+"""Places beside a thing at which a form is tried, in order."""
 ENCLOSING = frozenset({"arc", "polygon", "star", "u", "v"})
 
 
 @dataclass(frozen=True)
 class Form:
-    """What robots draw.
+    """A form that robots draw.
 
     Attributes:
         shape: of the contract, without its place.
-        said: the words for it.
-        robots: how many it takes, where it says so.
+        wording: its name in sentences to the person.
+        robots: how many robots it takes; None where any number will do.
     """
 
     shape: dict[str, Any]
@@ -45,7 +45,7 @@ class Form:
 
 
 def form_in(instruction: str) -> tuple[Form | None, tuple[int, int]]:
-    """The form that an instruction names, and where its words stand: first, past-the-last."""
+    """Return the form of an instruction, or None, and its words' start and end in characters."""
     for read in (_letters, _grid, _figure):
         found = read(instruction)
         if found is not None:
@@ -59,9 +59,9 @@ Found = tuple[Form, re.Match[str]] | None
 
 
 def _letters(text: str) -> Found:
-    """Letters that are quoted, in capitals or alone, so that no other words are drawn.
+    """Return letters that are quoted, in capitals or alone, so that no other words are drawn.
 
-    They are a pen's strokes, or a font's outlines where the words say outlined.
+    They are pen strokes, or a font's outlines where the words say outlined.
     """
     more = r"(?: [A-Z0-9]{2,}(?! ?(?:px|pixels?|c?m)\b))*"
     written = rf"(?P<q>[\"'])(?P<quoted>[ !#-&(-~]+)(?P=q)|(?P<plain>[A-Z0-9]+{more})"

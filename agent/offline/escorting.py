@@ -1,4 +1,4 @@
-"""Words that have robots follow a thing as it moves: "and keep up with it for a minute"."""
+"""Words that make robots follow a moving thing: "and keep up with it for a minute"."""
 
 import re
 from collections.abc import Callable
@@ -42,12 +42,12 @@ SECONDS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 def following(task: Task, turn: History, step: Callable[[Task], Reply]) -> Reply:
-    """The next step for a task, with leave to follow where its words give it.
+    """Return the next step for a task, with permission to follow where its words give it.
 
     Args:
-        task: as said.
+        task: with the person's own words.
         turn: messages of the turn so far.
-        step: the next step for the task without the words that have a thing followed.
+        step: returns the next step for the task without the words about following.
     """
     about = Standing.of(task.standing).stood_about if task.standing else ""
     words, follow = without_follow(task.instruction, about, task.metres_per_pixel)
@@ -68,16 +68,16 @@ def following(task: Task, turn: History, step: Callable[[Task], Reply]) -> Reply
 def without_follow(
     words: str, things: str, scale: float | None
 ) -> tuple[str, dict[str, float] | None]:
-    """The words without those that have the thing followed, and what these give leave to.
+    """Return the words without those about following, and what these permit.
 
     Args:
-        things: words for what robots stand about, where a plan stands; nothing else but that is
-            then "go".
-        scale: metres per pixel, where they are known.
+        things: words for what robots stand about, if there is a plan; if nothing else is left of
+            the words, they then become "go".
+        scale: metres per pixel, None where unknown.
 
     Returns:
-        The rest, and arguments of `deploy`'s `follow`; None where nothing is to be followed, or
-        another thing than the one that robots stand about.
+        The rest, and the value of `deploy`'s argument `follow`; None where nothing is to be
+        followed, or a thing other than the one that robots stand about.
     """
     found = CLAUSE.search(words)
     if found is None:
@@ -93,7 +93,7 @@ def without_follow(
 
 
 def _leave(tail: str, scale: float | None) -> dict[str, float] | None:
-    """For how long and how fast, as far as that is said; None for what cannot be told in px."""
+    """Return for how long, s, and how fast, px/s, as far as given; None if either is not clear."""
     leave: dict[str, Any] = {}
     for part in re.finditer(TAIL, tail, re.IGNORECASE):
         if part["time"]:
@@ -107,7 +107,7 @@ def _leave(tail: str, scale: float | None) -> dict[str, float] | None:
 
 
 def _number_said(text: str) -> float | None:
-    """A number in digits or words."""
+    """Return a number above 0 in digits or words; None if there is not exactly one."""
     if text.strip().lower() in ("a", "an"):
         return 1.0
     found = numbers_in(text)

@@ -1,6 +1,6 @@
-"""What the words right before a thing say of the arrangement, whatever else is in the sentence.
+"""Evidence for an arrangement from the words right before a thing.
 
-"Around the helipad" is no row and nothing in it, however unlike the sentences a model has seen.
+"Around the helipad" means no row and nothing inside it, however unlike the training sentences.
 """
 
 import re
@@ -11,9 +11,9 @@ from .demands import Item, demands_in
 from .tagging import Tagging, Token, in_use, word_classes
 
 UNLIKELY, LESS_LIKELY = 0.002, 0.3
-"""Factors for arrangements that the words rule out, and for those that are none of one thing."""
+"""Factors on arrangements that the words rule out, and on "several" and "ask"."""
 LIKELY = 0.1
-"""What is added to that of the arrangement that they are usually said of."""
+"""Probability added to the arrangement that the words usually mean."""
 ANY = frozenset(("several", "ask"))
 TIPS = r"(?:corners?|vertex|vertices|tips?|points|apex(?:es)?|apices|peaks|cusps?)"
 EVIDENCE = tuple(
@@ -32,13 +32,13 @@ EVIDENCE = tuple(
          r"(?:it|<t>)", "along shape between"),
     )
 )  # fmt: skip
-"""Words before a thing, and the arrangements that they can be said of, the usual one first."""
+"""Words before a thing, and the arrangements that they can mean, the usual one first."""
 ENCLOSING = ("enclose", "enclosure", "prevent", "surround")
-"""After verbs of these classes "in" and "on" belong to the verb: "fence in", "close in on"."""
+"""Classes of verbs to which a following "in" or "on" belongs: "fence in", "close in on"."""
 
 
 def meaning_of(words: Sequence[Token], tagging: Tagging, items: Sequence[Item]) -> dict[str, float]:
-    """What the command means, where lengths with the words about them say nothing of it."""
+    """Return probabilities of arrangements, with or without words about lengths, as is surer."""
     lengths = [d for d in demands_in(items) if d.sets in (*LENGTHS, "robot_diameter", "apart")]
     spans = [(items[d.first].start, items[d.last - 1].end) for d in lengths]
     labels = [
@@ -51,7 +51,7 @@ def meaning_of(words: Sequence[Token], tagging: Tagging, items: Sequence[Item]) 
 
 
 def weighed(meaning: Mapping[str, float], items: Sequence[Item]) -> dict[str, float]:
-    """Probabilities of arrangements, less likely where the words before the thing rule them out."""
+    """Return probabilities, lower for arrangements that the words before the thing rule out."""
     line = " ".join(i.symbol for i in items)
     found = dict(meaning)
     for pattern, fitting in EVIDENCE:
@@ -67,7 +67,7 @@ def weighed(meaning: Mapping[str, float], items: Sequence[Item]) -> dict[str, fl
 
 
 def _of_verb(before: str, words: str) -> bool:
-    """Whether a preposition belongs to the verb before it."""
+    """Return whether a preposition belongs to the verb before it."""
     near = words.split()[0] in ("in", "on", "over", "about", "round")
     verbs = word_classes(before.split()[-2:])
     return near and any({*ENCLOSING} & {*classes} for classes in verbs)

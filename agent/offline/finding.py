@@ -1,4 +1,4 @@
-"""Things that a follow-up names: among what is measured, or else in the picture."""
+"""Finds things that a follow-up names, among what is measured or else in the picture."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,11 @@ from .references import described
 from .standing import Standing
 
 CLEARLY = 0.7
-"""Of the share of a colour that the most coloured has: what has less of it is not meant by it."""
+"""Least share of a colour that a thing meant by it has, relative to the one that has most."""
 
 
 def known_thing(phrase: str, standing: Standing, messages: History) -> str | Step | None:
-    """The one known thing, none of the plan's, that fits words; what to do first, or None."""
+    """Return the known thing, not the plan's, that fits words, a call needed first, or None."""
     others = {t: at for t, at in (standing.centre or {}).items() if t in standing.others()}
     things = described([phrase])
     vague = len(things) != 1 or not things[0].noun or things[0].unknown or things[0].refused
@@ -28,7 +28,7 @@ def known_thing(phrase: str, standing: Standing, messages: History) -> str | Ste
 def one_at(
     query: dict[str, Any], centres: Mapping[str, Sequence[float]], messages: History
 ) -> str | Step | None:
-    """The one of some known things that fits a query, what to do first, or None."""
+    """Return the one of some known things that fits a query, a call to make first, or None."""
     reply = located(query or None, messages)
     if reply is None:
         return Step("locate_object", {"query": query} if query else {})
@@ -43,7 +43,7 @@ def one_at(
 
 
 def found_thing(phrase: str, standing: Standing, messages: History) -> Found | Step:
-    """The candidate that words for a thing mean, or what to do to learn it."""
+    """Return the candidate that words for a thing mean, or the call that helps to find it."""
     if re.fullmatch(r"c[0-9]+", phrase):
         return Found(phrase, phrase, ())
     if f"?{phrase}" == OTHER or phrase.startswith("other "):
@@ -53,7 +53,7 @@ def found_thing(phrase: str, standing: Standing, messages: History) -> Found | S
 
 
 def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
-    """The one like the target, or of another noun, that is none of the targets."""
+    """Return the one that is like the target, or of the noun named, but not a target itself."""
     label = next((label for name, label in standing.things if name in standing.targets), "")
     things = described(
         [phrase.removeprefix("other ") if f"?{phrase}" != OTHER else label or "thing"]
@@ -88,7 +88,7 @@ def _other(phrase: str, standing: Standing, messages: History) -> Found | Step:
 def measured_at(
     candidate: str, centres: Mapping[str, Sequence[float]], messages: History
 ) -> str | None:
-    """The id of what is measured already where a candidate lies; None where nothing is."""
+    """Return the id of a measured thing where a candidate lies; None where there is none."""
     boxes = [c["box"] for c in sightings([candidate], messages)]
     there = (t for t, at in centres.items() for box in boxes if _holds(box, (at[0], at[1])))
     return next(there, None)

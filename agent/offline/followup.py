@@ -1,4 +1,4 @@
-"""What is meant by what is said when a plan stands, as a value."""
+"""The value that words about an existing plan are read into."""
 
 import re
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ class Followup:
     """What is to be done in a turn.
 
     Attributes:
-        kind: what it is above all.
-        undo: steps to take back first; below 0 to make again.
+        kind: what it mainly is.
+        undo: steps to take back first; below 0 to redo.
         to: the plan to go back to instead, "first".
         edits: then, in order, as edit_formation takes them. An id that begins with "?" is words
             for a thing that has to be found; `by` may be {"out": px} or {"in": px}.
         stay: robots that do not move meanwhile.
         go, hold: whether robots move then, or not before "go".
-        query: what is asked of the plan: about, and robots or a thing.
-        about: small talk: thanks, hello, help, did, why, status, already; or tied, where a robot's
-            place settles not which one is meant.
+        query: a question about the plan: about, and robots or a thing.
+        about: the topic of talk, such as thanks, hello, help, did, why, status, already; or tied,
+            where a robot's place does not settle which one is meant.
         text: a question or a refusal; the words of a whole new instruction.
         options: commands that answer the question.
         rest: what is to be done after that, once it is confirmed.
-        background: what was told beside it and changes nothing.
+        background: words that only state something and change nothing.
     """
 
     kind: Kind
@@ -46,6 +46,6 @@ class Followup:
 
     @property
     def things(self) -> list[str]:
-        """Words for things that have to be found, once each."""
+        """Words for things that have to be found, without repeats."""
         named = re.findall(r"'\?([^']*)'", repr([*self.edits, self.query]))
         return list(dict.fromkeys(named))

@@ -26,11 +26,11 @@ BESIDES = re.compile(
     r"|[ ,.]+(?:i mean(?:t)?|sorry|please|then|i think|i guess|of course)(?=\W*$)",
     re.IGNORECASE,
 )
-"""What stands before or after an answer."""
+"""Words that come before or after an answer and say nothing."""
 ALTERNATIVES = re.compile(
     r"\b(?:robots? |number )?(t?[0-9]+) or (?:robot |number )?t?[0-9]+\b", re.IGNORECASE
 )
-"""One of which an answer chooses: "robot 3 or 4"."""
+"""Alternatives that an answer chooses from: "robot 3 or 4"."""
 LEADING = re.compile(r"\W*(?:(?:robot|number|nr|no)\.? )*(t?[0-9]+)\b[ ,.:]*(.*)", re.IGNORECASE)
 """The number that an answer begins with, and the rest of it."""
 THING_ID = re.compile(r"\bt[0-9]+\b")
@@ -38,7 +38,7 @@ BARE_THING = re.compile(r"\W*(?:the|that|this|t[0-9]+)\b", re.IGNORECASE)
 
 
 def words_meant(words: str, followup: Followup, answer: str, standing: Standing | None) -> str:
-    """The words that an answer makes of what was asked about; a new command stands alone."""
+    """Return the words with an answer put in, or the answer alone if it is a command."""
     chosen = _chosen(answer, followup.options) or _naming(answer, followup.options, standing)
     if chosen:
         return chosen
@@ -56,7 +56,7 @@ def words_meant(words: str, followup: Followup, answer: str, standing: Standing 
 
 
 def _chosen(answer: str, options: Sequence[str]) -> str | None:
-    """The option that an answer is, by its number or words, or by yes to the only one."""
+    """Return the option chosen by number, by its words, or by yes to the only one."""
     number = re.fullmatch(r"\W*(?:option |number )?([0-9]+)\W*", answer.lower())
     if number and 1 <= int(number[1]) <= len(options):
         return options[int(number[1]) - 1]
@@ -66,7 +66,7 @@ def _chosen(answer: str, options: Sequence[str]) -> str | None:
 
 
 def _filled_in(words: str, answer: str) -> list[str]:
-    """The words with the answer in place of what they left open."""
+    """Return the words with the answer in place of what they left open."""
     lead, either = LEADING.match(answer), ALTERNATIVES.search(words)
     shown = DEICTIC.search(words)
     if lead and either:
@@ -77,7 +77,7 @@ def _filled_in(words: str, answer: str) -> list[str]:
 
 
 def _naming(answer: str, options: Sequence[str], standing: Standing | None) -> str | None:
-    """An option about the thing that an answer names, where options differ in their thing alone."""
+    """Return an option about the thing named, if the options differ only in their thing."""
     forms = {THING_ID.sub("{}", option) for option in options}
     if len(forms) != 1 or len(options) < 2 or not BARE_THING.match(answer):
         return None

@@ -1,9 +1,8 @@
-"""From a frame that fits a clause to edits of the plan, one function a frame.
+"""Edits of the plan for a frame that fits a clause, one function per frame.
 
-Shares that words stand for are fixed here: "a bit" of a distance is a quarter more of it, of a
-turn 15 degrees, of a way 5 % of the picture's shorter side. Each function returns effects as JSON:
-edits, or what else a turn does (undo, go, hold, query, talk, ask, refuse); None where the
-frame does not fit what stands.
+Each returns effects as JSON: edits, or what else a turn does (undo, go, hold, query, talk, ask,
+refuse); None where the frame does not fit the plan. "A bit" is a quarter of a distance, 15 degrees
+of a turn, and 5 % of the picture's shorter side for a way.
 """
 
 import re
@@ -20,29 +19,29 @@ from .standing import Standing
 Effect = dict[str, Any]
 Effects = list[Effect] | None
 FACTOR = {"bit": 1.25, "": 1.5, "big": 2.0}
-"""Of distances, spacings and sizes."""
+"""Factors on distances, spacings and sizes, by how much is said."""
 TURN = {"bit": 15.0, "": 45.0, "big": 90.0}
-"""Degrees."""
+"""Turns in degrees, by how much is said."""
 ADDED_LENGTH = re.compile(
     r"[,;:]\s*[\w.]+ ?(?:px|pix|m\b|met|cm)\w*(?: (?:from|off|away|across|wide)\b[\w ]*)?\W*$",
     re.IGNORECASE,
 )
-"""A length said after the change, "further out, 6 m": so far it is then."""
+"""A length after a change gives the total, not the change: "further out, 6 m"."""
 STEP = re.compile(r"\b(?:position|place|spot|slot|step|seat)s?\b", re.IGNORECASE)
-"""Of a ring: from one robot to the next."""
+"""Words for the step from one robot of a ring to the next."""
 EXACT = re.compile(
     rf"\bto (?:exactly |about |just |only |some )?(?:[0-9]|(?:{'|'.join((*SMALL, *TENS))})\b)",
     re.IGNORECASE,
 )
-"""The whole of it, not a change: "increase it to 60 px"."""
+"""Words that give the total, not the change: "increase it to 60 px"."""
 CENTRE = re.compile(r"\b(?:middle|cent(?:re|er))\b", re.IGNORECASE)
 IN_PICTURE = re.compile(r"\b(?:picture|image|photo|screen)\b", re.IGNORECASE)
 LESSER = re.compile(r"\W*(?:not (?:so|as|that|quite)|less)\b", re.IGNORECASE)
-"""Takes a part of the last change back: "not so tight"."""
+"""Words that take part of the last change back: "not so tight"."""
 SAME_WAY = re.compile(r"\bsame (?:way|direction|sense)\b", re.IGNORECASE)
 UPSIDE = re.compile(r"\bupside down\b|\bon its head\b", re.IGNORECASE)
 LEAST_BARE = 5
-"""Numbers without a unit below this are hardly pixels."""
+"""Least number without a unit that is read as pixels."""
 SIDES = ("left", "right", "top", "bottom")
 SIDE_OF = {"up": "top", "down": "bottom", **dict(zip(SIDES, SIDES, strict=True))}
 ALIKE = {"long": "long", "short": "short"}
@@ -51,20 +50,20 @@ DEGREES = {"right": 0, "down": 90, "bottom": 90, "left": 180, "up": 270, "top": 
 RINGS = ("around", "cage")
 ROWS = ("along", "between")
 OTHER = "?the other one"
-"""A thing that is to be found: one like the target that is not it."""
+"""Stands for a thing that has to be found: another one like the target."""
 
 
 @dataclass(frozen=True)
-class Said:
-    """What stands when a clause is said.
+class Utterance:
+    """A clause, and the plan and words that it is read with.
 
     Attributes:
-        standing: the plan, and what was done last.
+        standing: the current plan, and what was done last.
         words: of the clause.
         before: effects of the clauses before it in the same line.
         denies: whether the line begins with "no".
         phrases: of the clause, each with its words.
-        line: all that was said.
+        line: the whole line.
     """
 
     standing: Standing
@@ -76,12 +75,12 @@ class Said:
 
     @property
     def kinds(self) -> set[str]:
-        """Kinds of its phrases."""
+        """Kinds of the clause's phrases."""
         return {kind for chunk, _ in self.phrases for kind in chunk.kinds}
 
     @property
     def last(self) -> list[Effect]:
-        """The last edits: of this line, else of the turn before."""
+        """The last edits: those of this line, else those of the turn before."""
         return [dict(e) for e in self.before or self.standing.edits]
 
     @property
@@ -91,23 +90,23 @@ class Said:
 
 
 def ask(question: str, *options: str) -> list[Effect]:
-    """A question with commands that would answer it."""
+    """Return a question as an effect, with commands that would answer it."""
     return [{"kind": "ask", "question": question, "options": options}]
 
 
 def refuse(sentence: str) -> list[Effect]:
-    """What cannot be done, and what would do."""
+    """Return a refusal as an effect: what cannot be done, and what can."""
     return [{"kind": "refuse", "text": sentence}]
 
 
 def much_of(slots: Slots) -> str:
-    """How much: bit, big or ""; "a bit more" is a bit."""
+    """Return how much: "bit", "big" or ""; "a bit more" is "bit"."""
     said = [str(m) for m in slots.get("much", ())]
     return "bit" if "bit" in said else said[0] if said else ""
 
 
 def bare_length(slots: Slots) -> float | None:
-    """The length in px; a number without a unit is one unless it is small."""
+    """Return the length in px; a number without a unit counts unless it is small. None if none."""
     if "px" in slots:
         return float(slots["px"][0]) if slots["px"][0] > 0 else None
     number = slots.get("num", [0])[0]
@@ -115,7 +114,7 @@ def bare_length(slots: Slots) -> float | None:
 
 
 def factor_of(slots: Slots) -> float:
-    """By how much of itself a distance, spacing or size changes."""
+    """Return the factor by which a distance, spacing or size changes."""
     for name in ("ratio", "ratio_apart", "ratio_scale"):
         if name in slots:
             return float(slots[name][0])
@@ -123,12 +122,12 @@ def factor_of(slots: Slots) -> float:
 
 
 def rounded(value: float) -> float:
-    """To thousandths, so that what is written down is short."""
+    """Round to thousandths, so that stored numbers are short."""
     return round(value, 3) + 0.0  # never -0.0
 
 
-def offset(slots: Slots, said: Said) -> Effects:
-    """Further out or in: by px, a share, or a factor of the distance."""
+def offset(slots: Slots, said: Utterance) -> Effects:
+    """Move robots further out or in: by px, a share, or a factor of the distance."""
     ways = set(slots["radial"])
     length = bare_length(slots)
     slots.has("away")
@@ -147,20 +146,20 @@ def offset(slots: Slots, said: Said) -> Effects:
     return [{"kind": kind, "factor": rounded(factor_of(slots))}]
 
 
-def _is_mine(names: Sequence[Any], said: Said) -> bool:
-    """Whether one known noun alone is the thing they stand about: "further from the car"."""
+def _is_mine(names: Sequence[Any], said: Utterance) -> bool:
+    """Return whether a single noun means the plan's only target: "further from the car"."""
     strange = len(names) == 1 and names[0][:1] == "?"
     return strange and is_noun(str(names[0])[1:]) and len(said.standing.targets) == 1
 
 
 def is_noun(word: str) -> bool:
-    """Whether one word is a noun for a thing."""
+    """Return whether a word is a noun for a thing."""
     found = phrase([word], 0)
     return found is not None and found.kind == "noun"
 
 
-def ratio(slots: Slots, said: Said) -> Effects:
-    """Twice, half, three times as far."""
+def ratio(slots: Slots, said: Utterance) -> Effects:
+    """Multiply the distance: twice, half, three times as far."""
     factor = float(slots["num"][0]) if "num" in slots else float(slots["ratio"][0])
     radial = {e["kind"] for e in said.last} <= {"out", "in", "distance"}
     if "that" in said.words.lower().split() and not (said.last and radial):
@@ -174,8 +173,8 @@ def ratio(slots: Slots, said: Said) -> Effects:
     ]
 
 
-def distance(slots: Slots, said: Said) -> Effects:
-    """Exactly so far from the thing; at least, or at most, is so far too."""
+def distance(slots: Slots, said: Utterance) -> Effects:
+    """Set the distance from the thing; "at least" and "at most" set it too."""
     slots.has("bound")
     if any(r != said.standing.relation for r in slots.get("relation", ())):
         return None
@@ -183,8 +182,8 @@ def distance(slots: Slots, said: Said) -> Effects:
     return None if length is None else [{"kind": "distance", "px": length}]
 
 
-def spacing(slots: Slots, said: Said) -> Effects:
-    """So far from one robot to the next, at least or exactly, or further apart."""
+def spacing(slots: Slots, said: Utterance) -> Effects:
+    """Set the spacing between robots (at least or exactly), or change it by a factor."""
     slots.has("bound")
     if "spacing" in slots or "ratio_apart" in slots:
         value = {"px": float(slots["px"][0])} if "px" in slots else {"factor": factor_of(slots)}
@@ -200,8 +199,8 @@ def spacing(slots: Slots, said: Said) -> Effects:
     ]
 
 
-def rotate(slots: Slots, said: Said) -> Effects:
-    """A turn: clockwise unless said otherwise."""
+def rotate(slots: Slots, said: Utterance) -> Effects:
+    """Rotate the formation, clockwise unless stated otherwise."""
     directions = {
         *slots.get("spin", ()),
         *({"right": "cw", "left": "ccw"}.get(d, d) for d in slots.get("dir", ())),
@@ -218,7 +217,7 @@ def rotate(slots: Slots, said: Said) -> Effects:
     last = _of_kind(said.last, "rotate")
     if "otherway" in slots or "back" in slots:
         if not any(name in slots for name in ("angle", "num", "much")) and last:
-            twice = 2 if "otherway" in slots else 1  # what was turned back, and as far again
+            twice = 2 if "otherway" in slots else 1  # turn back, then as far again
             return [{**last, "degrees": -twice * last["degrees"]}]
         sign = -1 if last is None or last["degrees"] > 0 else 1
     elif ("more" in slots or SAME_WAY.search(said.words)) and not directions and last:
@@ -230,14 +229,14 @@ def _of_kind(edits: list[Effect], *kinds: str) -> Effect | None:
     return next((e for e in reversed(edits) if e["kind"] in kinds), None)
 
 
-def upended(slots: Slots, said: Said) -> Effects:
-    """Upside down: half a turn, by which a V opens to the other side."""
+def upended(slots: Slots, said: Utterance) -> Effects:
+    """Turn it upside down, by half a turn: a V then opens to the other side."""
     upside = slots["axis"] == ["top-bottom"] and UPSIDE.search(said.words)
     return [{"kind": "rotate", "degrees": 180}] if upside else None
 
 
-def mirror(slots: Slots, said: Said) -> Effects:
-    """Left for right, unless said otherwise."""
+def mirror(slots: Slots, said: Utterance) -> Effects:
+    """Mirror the formation, left for right unless stated otherwise."""
     across = {"left": "left-right", "right": "left-right", "up": "top-bottom", "down": "top-bottom"}
     across |= {"top": "top-bottom", "bottom": "top-bottom"}
     slots.has("opposite")
@@ -246,8 +245,8 @@ def mirror(slots: Slots, said: Said) -> Effects:
     return [{"kind": "mirror", "axis": axis}]
 
 
-def scale(slots: Slots, said: Said) -> Effects:
-    """Bigger or smaller."""
+def scale(slots: Slots, said: Utterance) -> Effects:
+    """Make it bigger or smaller; right after a gap was changed, the gap."""
     opens = said.standing.groups[0].get("opening") is not None
     if opens and _of_kind(said.last, "opening") and slots.has("scale"):
         factor = factor_of(slots) ** (1 if slots["scale"][0] == "bigger" else -1)
@@ -268,15 +267,15 @@ def scale(slots: Slots, said: Said) -> Effects:
     ]
 
 
-def resized(slots: Slots, said: Said) -> Effects:
-    """To so many times its size."""
+def resized(slots: Slots, said: Utterance) -> Effects:
+    """Scale it to so many times its size."""
     slots.has("size", "scale")
     factor = float(slots["num"][0] if "num" in slots else slots["share"][0])
     return [{"kind": "scale", "factor": rounded(factor)}] if factor > 0 else None
 
 
-def snug(slots: Slots, said: Said) -> Effects:
-    """Tighter, looser: from robot to robot, in a row or after a word about that."""
+def snug(slots: Slots, said: Utterance) -> Effects:
+    """Change the spacing (tighter, looser) in a row or after a change of spacing."""
     apart = bool(said.last) and said.last[-1]["kind"] == "spacing"
     if apart and LESSER.match(said.words) and "factor" in said.last[-1] and len(slots) == 1:
         last = said.last[-1]["factor"]
@@ -289,8 +288,8 @@ def snug(slots: Slots, said: Said) -> Effects:
     return [{"kind": "spacing", "factor": rounded(factor if wide else 1 / factor)}]
 
 
-def heading(slots: Slots, said: Said) -> Effects:
-    """Which way robots look."""
+def heading(slots: Slots, said: Utterance) -> Effects:
+    """Set which way robots look."""
     slots.has("turn", "where")
     if "unface" in slots or "current" in slots:
         return [{"kind": "heading", "to": "towards" if "current" in slots else None}]
@@ -324,8 +323,8 @@ def heading(slots: Slots, said: Said) -> Effects:
     return [{"kind": "heading", "to": float(slots["angle"][0])}]
 
 
-def keepout(slots: Slots, said: Said) -> Effects:
-    """Robots stay off another thing."""
+def keepout(slots: Slots, said: Utterance) -> Effects:
+    """Keep robots clear of another thing."""
     if not slots.has("thing", "there", "other"):
         return ask(
             f'Which thing is to be kept clear of in "{said.words}"? Point at it, or name it.'
@@ -334,8 +333,8 @@ def keepout(slots: Slots, said: Said) -> Effects:
     return to if isinstance(to, list) else [{"kind": "keep-out", "ids": [to]}]
 
 
-def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Effect]:
-    """The id of the thing meant, its words after "?" where it has to be found, or a question."""
+def where(slots: Slots, said: Utterance, option: str = "around {}") -> str | list[Effect]:
+    """Return the id of the thing meant, "?" and its words if it has to be found, or a question."""
     standing = said.standing
     if "thing" in slots:
         return str(slots["thing"][0])
@@ -352,8 +351,8 @@ def where(slots: Slots, said: Said, option: str = "around {}") -> str | list[Eff
     return OTHER
 
 
-def centre_of(slots: Slots, said: Said) -> tuple[float, float] | None:
-    """The centre that is named: of a thing, the picture, or what the robots stand about; px."""
+def centre_of(slots: Slots, said: Utterance) -> tuple[float, float] | None:
+    """Return the centre that is named, of a thing, the picture or the target, px; else None."""
     if not CENTRE.search(said.words):
         return None
     if IN_PICTURE.search(said.line):
@@ -364,6 +363,6 @@ def centre_of(slots: Slots, said: Said) -> tuple[float, float] | None:
 
 
 def listed(numbers: Sequence[object]) -> str:
-    """Numbers or names in a sentence."""
+    """Return numbers or names joined for a sentence: "1, 2 and 3"; "none" if there are none."""
     *most, last = map(str, numbers or ("none",))
     return f"{', '.join(most)} and {last}" if most else last

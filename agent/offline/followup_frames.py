@@ -1,4 +1,4 @@
-"""Which frame of followups.yaml takes all phrases of a clause, and what each is there for."""
+"""The frames of followups.yaml: which takes all phrases of a clause, and as what."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from .followup_words import Chunk, rules
 
 
 class Slots(dict[str, list[Any]]):
-    """What fills each kind of phrase, in order, and which kinds were looked at."""
+    """The values of each kind of phrase, in order; remembers which kinds were looked at."""
 
     def __init__(self, *given: Any, **more: Any) -> None:
         super().__init__(*given, **more)
@@ -24,30 +24,30 @@ class Slots(dict[str, list[Any]]):
         return super().__contains__(name)
 
     def get(self, name: str, default: Any = None) -> Any:
-        """What fills a kind."""
+        """Return the values of a kind, and mark it as used."""
         self.used.add(name)
         return super().get(name, default)
 
     def has(self, *names: str) -> bool:
-        """Whether a phrase of one of these kinds is there."""
+        """Return whether there is a phrase of any of these kinds, and mark all of them as used."""
         return len([name for name in names if name in self]) > 0  # looks at all of them
 
     @property
     def unused(self) -> set[str]:
-        """Kinds of phrases that nothing has looked at, and that say something."""
+        """Kinds of phrases that say something and that nothing has looked at."""
         return {name for name in self if name not in self.used and name not in rules()["void"]}
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A way to say something: the kinds of phrases it needs and may have; `*` in `many`.
+    """A way to say something: the kinds of phrases it needs and may have.
 
     Attributes:
-        name: what it comes to.
+        name: of the function that returns its effects, or of what it asks or talks about.
         asks: whether only a question says it.
-        needs: for each phrase that there must be its kinds.
-        may: kinds of further phrases.
-        many: kinds that may stand several times.
+        needs: for each required phrase, the kinds that it may have.
+        may: kinds of optional phrases.
+        many: kinds that may occur several times, marked `*` in followups.yaml.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Frame:
     many: frozenset[str]
 
     def slots(self, chunks: Sequence[Chunk]) -> Slots | None:
-        """What fills each kind, in order; None where a phrase is left over or missing."""
+        """Return the values of each kind, in order; None where a phrase is left over or missing."""
         for taken in self._taken(chunks, 0, {}):
             rest = [k for k in range(len(chunks)) if k not in taken]
             slots = Slots()
@@ -72,7 +72,7 @@ class Frame:
     def _taken(
         self, chunks: Sequence[Chunk], need: int, taken: dict[int, str]
     ) -> Iterator[dict[int, str]]:
-        """Every way to fill the needs."""
+        """Yield every way to fill the needs, as phrase indices and kinds."""
         if need == len(self.needs):
             yield taken
             return
@@ -82,7 +82,7 @@ class Frame:
                     yield from self._taken(chunks, need + 1, {**taken, k: kind})
 
     def _allowed(self, chunk: Chunk, kinds: dict[int, str], k: int) -> bool:
-        """Whether a phrase beside the needed ones may stand there; notes as what."""
+        """Return whether a phrase beside the needed ones is allowed, and record its kind."""
         used = set(kinds.values())
         for kind in (*self.may, *self.many):
             if kind in chunk.kinds and (kind in self.many or kind not in used):
@@ -93,13 +93,13 @@ class Frame:
 
 @cache
 def common() -> tuple[str, ...]:
-    """Kinds of phrases that any frame takes: they say nothing more of it."""
+    """Return the kinds of phrases that any frame takes, as they add nothing."""
     return tuple(rules()["common"])
 
 
 @cache
 def frames() -> tuple[Frame, ...]:
-    """The frames, in the order in which they are tried."""
+    """Return the frames in the order in which they are tried."""
     return tuple(map(_frame, rules()["frames"]))
 
 

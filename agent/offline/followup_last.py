@@ -1,4 +1,4 @@
-"""From a frame to edits that follow from the last ones: more of it, less, the other way, not so."""
+"""Edits that follow from the last ones: more of it, less, the other way, not so far."""
 
 import re
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from .followup_edits import (
     TURN,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     factor_of,
     much_of,
@@ -24,13 +24,13 @@ RELATIVE = (
     *("out", "in", "rotate", "shift", "scale", "spacing", "place", "add", "remove"),
     *("mirror", "swap"),
 )
-"""Kinds that are done again on top of themselves."""
+"""Kinds of edits that can be repeated, each on top of the one before."""
 FURTHER = re.compile(r"\b(?:further|farther)(?: please)?\W*$", re.IGNORECASE)
-"""Without a word for where to, it is on in the direction of the last move."""
+"""Without a direction, this goes on in that of the last move."""
 
 
-def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
-    """The last edits of one of these kinds: of robots that moved one by one, all that did."""
+def _latest(said: Utterance, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
+    """Return the last edit of one of these kinds; if robots moved one by one, all those edits."""
     edits = [dict(e) for e in said.last]
     while edits and edits[-1]["kind"] not in kinds:
         edits.pop()
@@ -38,8 +38,8 @@ def _latest(said: Said, kinds: Sequence[str] = RELATIVE) -> list[Effect]:
     return edits[alike[-1] + 1 if alike else 0 :] if edits and "robot" in edits[-1] else edits[-1:]
 
 
-def further_on(slots: Slots, said: Said) -> Effects:
-    """ "A bit further", after a robot was moved or all were turned: on in that direction."""
+def further_on(slots: Slots, said: Utterance) -> Effects:
+    """Read "a bit further" after a robot was moved or all were turned: on in that direction."""
     kinds = {e["kind"] for e in _latest(said)}
     slots.has("radial", "again")
     if not kinds or kinds - {"place", "rotate"}:
@@ -47,16 +47,16 @@ def further_on(slots: Slots, said: Said) -> Effects:
     return more(slots, said) if FURTHER.search(said.words) else None
 
 
-def again(slots: Slots, said: Said) -> Effects:
-    """The last change once more; what was taken back, made again."""
+def again(slots: Slots, said: Utterance) -> Effects:
+    """Repeat the last change, or redo what was just taken back."""
     if said.standing.redo and not said.before and not said.last:
         return [{"kind": "undo", "steps": -1}]
     edits = [e for e in said.last if e["kind"] in RELATIVE and "to" not in e]
     return edits or None
 
 
-def more(slots: Slots, said: Said) -> Effects:
-    """More of the last change; without an amount as much again."""
+def more(slots: Slots, said: Utterance) -> Effects:
+    """Do more of the last change; without an amount, as much again."""
     last = _latest(said, (*RELATIVE, "opening", "distance"))
     if not last:
         return ask("More of what?", "a bit further out", "a bit closer", "one more robot")
@@ -65,8 +65,8 @@ def more(slots: Slots, said: Said) -> Effects:
     return found if len(found) == len(last) else None
 
 
-def more_of(slots: Slots, said: Said) -> Effects:
-    """More of the last change, for some of the robots it was about."""
+def more_of(slots: Slots, said: Utterance) -> Effects:
+    """Do more of the last change for some of the robots it was about."""
     named = {r for robots in slots["robots"] for r in robots}
     slots.has("make", "move")
     placed = [e for e in _latest(said) if e.get("robot") in named]
@@ -75,7 +75,7 @@ def more_of(slots: Slots, said: Said) -> Effects:
     return found if len(found) == len(named) else None
 
 
-def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
+def _again(last: Effect, slots: Slots, said: Utterance) -> Effect | None:
     kind, size = last["kind"], min(said.standing.size)
     much = much_of(slots)
     length = float(slots["px"][0]) if "px" in slots else None
@@ -110,7 +110,7 @@ def _again(last: Effect, slots: Slots, said: Said) -> Effect | None:
 
 
 def _further(last: Effect, way: float | None) -> Effect | None:
-    """As far again in the direction of a move, or so far."""
+    """Return a move in the direction of the last one, as far again or `way` px far."""
     if way is None:
         return last
     by: Any = last.get("by")
@@ -124,16 +124,16 @@ def _further(last: Effect, way: float | None) -> Effect | None:
     return last | ({"dx": x, "dy": y} if last["kind"] == "shift" else {"by": [x, y]})
 
 
-def less_by(slots: Slots, said: Said) -> Effects:
-    """So many px less: of the distance, unless the last change was of something else."""
+def less_by(slots: Slots, said: Utterance) -> Effects:
+    """Reduce the distance by px; None if the last change was of something else."""
     distances = ("distance", "out", "in")
     if said.last and said.last[-1]["kind"] not in distances:
         return None
     return [{"kind": "in", "px": float(slots["px"][0])}]
 
 
-def less(slots: Slots, said: Said) -> Effects:
-    """Half of the last change taken back, however it is said."""
+def less(slots: Slots, said: Utterance) -> Effects:
+    """Take back half of the last change, whatever amount is given."""
     slots.has("much", "ratio", "back")
     last = _latest(said, (*RELATIVE, "opening"))
     halved = [half for edit in last if (half := _scaled(edit, -0.5)) is not None]
@@ -143,7 +143,7 @@ def less(slots: Slots, said: Said) -> Effects:
 
 
 def _scaled(edit: Effect, share: float) -> Effect | None:
-    """An edit that does a share of another; a negative one takes so much of it back."""
+    """Return an edit that does a share of another; a negative share takes so much of it back."""
     kind = edit["kind"]
     if kind in ("out", "in", "scale", "spacing", "opening"):
         back = {"out": "in", "in": "out"}.get(kind, kind)
@@ -175,8 +175,8 @@ def _scaled(edit: Effect, share: float) -> Effect | None:
     return None
 
 
-def otherway(slots: Slots, said: Said) -> Effects:
-    """The last change the other way; with an amount, so much of it back."""
+def otherway(slots: Slots, said: Utterance) -> Effects:
+    """Make the last change the other way; with "a bit" or the like, take half of it back."""
     turning = (*RELATIVE, "opening", "sides", "heading")
     last = _latest(said, turning)
     if not last:
@@ -190,7 +190,7 @@ def otherway(slots: Slots, said: Said) -> Effects:
 
 
 def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
-    """Edits in the place of the last ones: those are taken back first, as part of one change."""
+    """Return edits that replace the last ones: those are taken back first, within one change."""
     back = [inverse(e) for e in reversed(last)]
     found = [e for e in back if e is not None]
     if len(found) < len(back):
@@ -203,7 +203,7 @@ def corrected(last: Sequence[Effect], edits: Sequence[Effect]) -> list[Effect]:
 
 
 def _merged(first: Effect, then: Effect) -> list[Effect]:
-    """Two edits as one where they are of one kind."""
+    """Return two edits as one if they are of one kind and of the same robot, else both."""
     if first["kind"] != then["kind"] or first.get("robot") != then.get("robot"):
         return [first, then]
     if "factor" in first and "factor" in then:
@@ -218,7 +218,7 @@ def _merged(first: Effect, then: Effect) -> list[Effect]:
 
 
 def inverse(edit: Effect) -> Effect | None:
-    """The edit that takes another back; None where there is none."""
+    """Return the edit that takes another back; None where there is none."""
     if edit["kind"] in ("mirror", "swap"):
         return edit
     if edit["kind"] in ("add", "remove"):
@@ -228,7 +228,7 @@ def inverse(edit: Effect) -> Effect | None:
 
 
 def _turned(edit: Effect) -> Effect | None:
-    """An edit the other way round."""
+    """Return the edit in the opposite sense; None where there is none."""
     kind = edit["kind"]
     if kind in ("out", "in"):
         return edit | {"kind": {"out": "in", "in": "out"}[kind]}
@@ -247,8 +247,8 @@ def _turned(edit: Effect) -> Effect | None:
     return _scaled(edit, -1.0) if kind in ("rotate", "shift", "place") else None
 
 
-def toofar(slots: Slots, said: Said) -> Effects:
-    """Too far, too close: half of the last change back, where it went there; else a bit."""
+def toofar(slots: Slots, said: Utterance) -> Effects:
+    """Take half of the last change back if it led to "too far" or "too close", else move a bit."""
     if "dir" in slots:
         back = {"left": "right", "right": "left", "up": "down", "down": "up"}[slots["dir"][0]]
         return shift(Slots({"dir": [back], "much": ["bit"]}), said)

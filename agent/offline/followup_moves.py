@@ -1,4 +1,4 @@
-"""From a frame to edits that move robots as they stand: all of them, or one elsewhere."""
+"""Edits that move robots without rearranging them: all of them, or single ones elsewhere."""
 
 import re
 
@@ -6,7 +6,7 @@ from .followup_edits import (
     FACTOR,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     bare_length,
     centre_of,
@@ -17,15 +17,15 @@ from .followup_edits import (
 from .followup_frames import Slots
 
 WAY = {"bit": 0.05, "": 0.1, "big": 0.2}
-"""Of the picture's shorter side."""
+"""Lengths of moves as shares of the picture's shorter side, by how much is said."""
 TEAM = re.compile(
     r"\b(?:them|they|all|every\w*|robots|ring|circle|row|team|formation|whole)\b", re.IGNORECASE
 )
 VECTOR = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
 
 
-def way(slots: Slots, said: Said) -> tuple[float, float] | None:
-    """How far left, right, up or down, px."""
+def way(slots: Slots, said: Utterance) -> tuple[float, float] | None:
+    """Return the move left, right, up or down, as x and y in px; None where it is not clear."""
     vectors = [VECTOR[d] for d in slots["dir"]]
     length = bare_length(slots)
     if (
@@ -46,11 +46,11 @@ BESIDE = re.compile(
     r"(?<!the robots)(?<!all robots)(?<!these robots)[^,;.]*\bto the (?:left|right)\b",
     re.IGNORECASE,
 )
-"""What says where robots stand, or how many go: "to the left of it", "5 robots to the left"."""
+"""Words for where robots stand or how many go: "to the left of it", "5 robots to the left"."""
 
 
-def shift(slots: Slots, said: Said) -> Effects:
-    """All of it left, right, up or down; after a word about one robot, that one."""
+def shift(slots: Slots, said: Utterance) -> Effects:
+    """Move all robots left, right, up or down; after moves of single robots, those."""
     by = None if BESIDE.search(said.words) else way(slots, said)
     if by is None:
         return None
@@ -60,8 +60,8 @@ def shift(slots: Slots, said: Said) -> Effects:
     return [{"kind": "shift", "dx": by[0], "dy": by[1]}]
 
 
-def approach(slots: Slots, said: Said) -> Effects:
-    """All of it some way towards a thing."""
+def approach(slots: Slots, said: Utterance) -> Effects:
+    """Move all robots some way towards a thing."""
     current = slots.get("current")
     to = str(current[-1]) if current else where(slots, said, "towards {}")
     if isinstance(to, list):
@@ -79,8 +79,8 @@ def approach(slots: Slots, said: Said) -> Effects:
     return [{"kind": "shift", "dx": round(x / far * px, 1), "dy": round(y / far * px, 1)}]
 
 
-def place(slots: Slots, said: Said) -> Effects:
-    """One robot elsewhere: to a point, at a thing, or some way on."""
+def place(slots: Slots, said: Utterance) -> Effects:
+    """Move single robots: to a point, to a thing, or some way on."""
     robots = [r for named in slots["robots"] for r in named]
     if slots.has("relation", "inward"):
         to = centre_of(slots, said)
@@ -116,7 +116,7 @@ def place(slots: Slots, said: Said) -> Effects:
     return [{"kind": "place", "robot": r, "by": by} for r in robots]
 
 
-def _some_way(way: str, slots: Slots, said: Said) -> dict[str, float]:
-    """A share of the robot's distance, and the way that is at most."""
+def _some_way(way: str, slots: Slots, said: Utterance) -> dict[str, float]:
+    """Return a robot's way as a factor on its distance, and the most that it may be, px."""
     most = round(WAY[much_of(slots)] * min(said.standing.size))
     return {way: most, "factor": FACTOR[much_of(slots)]}

@@ -1,25 +1,25 @@
-"""From a frame to edits of how much, of a quantity that is named, and of how many go where."""
+"""Edits that change a named quantity, and edits of how many robots go where."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .followup_edits import EXACT, Effect, Effects, Said, ask, factor_of, rounded, where
+from .followup_edits import EXACT, Effect, Effects, Utterance, ask, factor_of, rounded, where
 from .followup_frames import Slots
 from .followup_teams import SHARES, how_many_fewer, how_many_more, whole
 from .followup_things import known
 
 HERE = ("here", "stay")
 VAGUE = (*HERE, "there", "other")
-"""Kinds of phrases for a thing that is told from the others that are named."""
+"""Kinds of phrases for a thing that follows from the other things named."""
 MODES = ("more", "add", "less", "remove", "too")
 PLACING = frozenset(
     ("filler", "sep", "team", "it", "move", "about", "towards", "side_of", "robotword", "make")
 ) | {"relation", "again", "split", "lone", "back", "same", "instead", "onword"}
-"""Kinds of phrases that say nothing of how many go where."""
+"""Kinds of phrases that do not matter for how many go where."""
 
 
-def changed(slots: Slots, said: Said) -> Effects:
-    """More or less of a quantity: by so much, to so much, or by a factor."""
+def changed(slots: Slots, said: Utterance) -> Effects:
+    """Change a quantity: by an amount, to an amount, or by a factor."""
     way, of = str(slots["grow"][0]), str(slots["quantity"][0])
     exact = way == "set" or EXACT.search(said.words) is not None
     if way == "set" and not {"px", "num"} & {*slots}:
@@ -46,8 +46,8 @@ def changed(slots: Slots, said: Said) -> Effects:
     return [{"kind": {"size": "scale"}.get(of, of), "factor": rounded(factor)}]
 
 
-def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -> Effects:
-    """More or fewer robots."""
+def _teamed(slots: Slots, said: Utterance, way: str, factor: float, *, exact: bool) -> Effects:
+    """Change the number of robots."""
     n = whole(slots)
     if "num" not in slots and way[0].isdecimal():
         return [{"kind": "count", "robots": max(round(said.count * factor), 1)}]
@@ -61,8 +61,8 @@ def _teamed(slots: Slots, said: Said, way: str, factor: float, *, exact: bool) -
     return None if fewer and n >= said.count else [{"kind": "remove" if fewer else "add", "n": n}]
 
 
-def allotted(slots: Slots, said: Said) -> Effects:
-    """So many about this thing, so many about that one: all that are there, or more of them."""
+def allotted(slots: Slots, said: Utterance) -> Effects:
+    """Put so many robots at this thing and so many at that one, or add or remove some there."""
     standing, told = said.standing, _roles(said)
     slots.used.update(slots)
     if told is None or not standing.targets:
@@ -87,14 +87,14 @@ def _is_about_one(group: Mapping[str, Any]) -> bool:
 
 
 def _group_of(thing: str, groups: Mapping[str, int]) -> Effect:
-    """The fields of an edit for the group about a thing, or for a new one there."""
+    """Return the fields of an edit for the group about a thing, or for a new group there."""
     if thing in groups:
         return {"group": groups[thing]} if len(groups) > 1 else {}
     return {"to": thing}
 
 
-def _roles(said: Said) -> list[tuple[str, Any]] | None:
-    """What each phrase is there for, in order; None where one is there for something else."""
+def _roles(said: Utterance) -> list[tuple[str, Any]] | None:
+    """Return the role and value of each phrase, in order; None where one has another role."""
     found: list[tuple[str, Any]] = []
     names = ("thing", "current", *VAGUE, "num", "portion", "each", *MODES)
     for chunk, words in said.phrases:
@@ -118,9 +118,9 @@ def _roles(said: Said) -> list[tuple[str, Any]] | None:
 
 
 def _matched(
-    told: Sequence[tuple[str, Any]], said: Said, targets: list[str]
+    told: Sequence[tuple[str, Any]], said: Utterance, targets: list[str]
 ) -> list[tuple[str, int]] | None:
-    """Things and numbers that are told of them; None where they do not go together."""
+    """Return pairs of thing and number of robots; None where they do not match."""
     things = [(kind, value) for kind, value in told if kind in ("thing", *VAGUE)]
     numbers = [_count(value, said) for kind, value in told if kind in ("num", "portion")]
     each = ("each", None) in told
@@ -140,23 +140,23 @@ def _matched(
     return list(zip(names, numbers, strict=True)) if len(numbers) == len(names) > 0 else None
 
 
-def _count(value: Any, said: Said) -> int:
-    """A number of robots or a share of them; 0 for what is none."""
+def _count(value: Any, said: Utterance) -> int:
+    """Return a number of robots, given as such or as a share; 0 if it is not a valid number."""
     if isinstance(value, str):
         return said.count // SHARES[value]
     return int(value) if value == int(value) and value > 0 else 0
 
 
 def _resolved_things(
-    things: Sequence[tuple[str, Any]], said: Said, targets: Sequence[str]
+    things: Sequence[tuple[str, Any]], said: Utterance, targets: Sequence[str]
 ) -> list[str] | None:
-    """The ids of things, of which some are told from the others that are named."""
+    """Return the ids of things, working out "here" or "the other" from those named; else None."""
     found: list[str | None] = [str(v) if kind == "thing" else None for kind, v in things]
     if len({kind for kind, _ in things if kind != "thing"}) < found.count(None):
         return None
     for at, (kind, _) in enumerate(things):
         if kind in VAGUE:
-            sought = any(str(t).startswith("?") for t in found)  # the other is one of those known
+            sought = any(str(t).startswith("?") for t in found)  # "the other" is then a known one
             rest = [] if kind in HERE or sought else said.standing.others()
             left = [t for t in (*rest, *targets) if t not in found]
             several = len([t for t in rest if t in left]) != 1 and len(left) > 1
@@ -170,14 +170,16 @@ def _resolved_things(
     return [t for t in found if t is not None]
 
 
-def _moved(wish: dict[str, int], groups: Mapping[str, int], said: Said, *, each: bool) -> Effects:
-    """The edits after which so many stand about each thing that is named."""
+def _moved(
+    wish: dict[str, int], groups: Mapping[str, int], said: Utterance, *, each: bool
+) -> Effects:
+    """Return the edits after which the wished number of robots stands about each named thing."""
     now = {t: int(said.standing.groups[k - 1]["robots"]) for t, k in groups.items()}
     if len(wish) < 2:
         return None
     if sum(wish.values()) != said.count and each and {*wish} == {*now}:
         return [{"kind": "count", "robots": n, "group": groups[t]} for t, n in wish.items()]
-    among = sum(now.get(t, 0) for t in wish)  # those of the things that are named
+    among = sum(now.get(t, 0) for t in wish)  # robots at the named things
     if sum(wish.values()) not in (among, said.count):
         if not {*wish} & {*now} and sum(wish.values()) < said.count:
             return None  # the rest stays

@@ -1,6 +1,6 @@
-"""Which robot is meant by its place: "the leftmost robot", "the second one from the top".
+"""Finds the robot meant by its place: "the leftmost robot", "the second one from the top".
 
-Its number is put in the place of the phrase, so that all that is said of robot 3 can be said of it.
+Its number replaces the phrase, so that whatever can be said of robot 3 can be said of it too.
 """
 
 import json
@@ -18,7 +18,7 @@ from .standing import Standing
 
 AMOUNTS = {"two": 2, "2": 2, "three": 3, "3": 3, "four": 4, "4": 4}
 LEAST_APART, APART = 1.0, 0.02
-"""Nearer to each other than so many px, or this share of all, no robot is more to one side."""
+"""Robots closer than this in px, or as a share of the whole extent, tie for a place."""
 MOST_OFFERED = 12
 TOWARDS = {
     **dict.fromkeys(("left", "west"), (-1, 0)),
@@ -60,7 +60,7 @@ PHRASES = tuple(
         rf"\bthe (?P<rank>{RANKS})(?P<one>) from (?:the )?(?P<way>{END})\b{CORNER}",
     )
 )
-"""Phrases for robots, or with `one` for robots or things, by where they stand."""
+"""Phrases for robots by where they stand; with the group `one`, for robots or things."""
 BOTH = re.compile(
     rf"\bthe (?P<a>{FAR}?{WAY}) and (?:the )?(?P<b>{FAR}?{WAY}) (?P<noun>{BOT}|one)s?\b",
     re.IGNORECASE,
@@ -69,18 +69,18 @@ BOTH = re.compile(
 LED = re.compile(
     r"\b(?:around|round|about|to|towards?|inside|between|by|near|along|from|of|at|on|onto) $"
 )
-"""Before "the left one", a thing is meant."""
+"""After these words "the left one" is a thing."""
 
 
 @dataclass(frozen=True)
 class Named:
-    """Words with robots called by their numbers.
+    """Words in which robots are named by their numbers.
 
     Attributes:
         words: the text, unchanged where no robot is meant by its place.
-        tied: for the first phrase that two robots or more fit alike, the phrase.
-        options: the text with each of those, a few at most.
-        robots: those.
+        tied: the first phrase that does not settle which robot is meant, or "".
+        options: the text with each robot that fits `tied`; empty if there are too many.
+        robots: the robots that fit `tied`.
     """
 
     words: str
@@ -90,18 +90,18 @@ class Named:
 
     @property
     def question(self) -> str:
-        """Which of the robots that fit is meant."""
+        """The question which of the robots that fit is meant."""
         fitting = f'"{self.tied}" fits {listed(self.robots)} alike'
         return f"Which robot is meant? {fitting}: name it by its number."
 
 
 def speaks_of_place(words: str) -> bool:
-    """Whether a robot may be meant by where it stands."""
+    """Return whether words may name a robot by where it stands."""
     return any(pattern.search(words) for pattern in PHRASES)
 
 
 def numbered(standing: Standing) -> Standing:
-    """What stands, with numbers for robots in the words that led to it."""
+    """Return the current plan with robots numbered in the words that led to it."""
     words, said = (
         named(text, standing, ones=True).words for text in (standing.words, standing.said)
     )
@@ -109,7 +109,7 @@ def numbered(standing: Standing) -> Standing:
 
 
 def meant_by_place(words: str, standing: Standing, clear: Callable[[str], bool]) -> Named:
-    """The words with numbers for robots; "the top one" is one where words are `clear` only then."""
+    """Return words with robots numbered; "the top one" is a robot if they are `clear` only then."""
     robots = named(words, standing, ones=False)
     if robots.tied or clear(robots.words):
         return robots
@@ -118,11 +118,11 @@ def meant_by_place(words: str, standing: Standing, clear: Callable[[str], bool])
 
 
 def named(words: str, standing: Standing, *, ones: bool) -> Named:
-    """The words with numbers for robots that are meant by their places in the plan.
+    """Return the words with numbers for robots that are meant by their places in the plan.
 
     Args:
-        words: what was said.
-        standing: with the places of its robots.
+        words: the person's words.
+        standing: the current plan, with the places of its robots.
         ones: whether "the left one" is a robot too.
     """
     words = BOTH.sub(r"the \g<a> \g<noun> and the \g<b> \g<noun>", words)
@@ -151,7 +151,7 @@ def named(words: str, standing: Standing, *, ones: bool) -> Named:
 
 
 def with_places(task: Task, turn: History) -> Reply | tuple[Task, History]:
-    """The task told where robots stand, where words speak of it; what to measure first, else."""
+    """Return the task with the robots' places if words refer to them, or first the measure call."""
     answers = [m.text for m in turn if isinstance(m, Result) and m.name == "ask_user"]
     if task.standing is None or not any(map(speaks_of_place, [task.instruction, *answers])):
         return task, turn
@@ -163,7 +163,7 @@ def with_places(task: Task, turn: History) -> Reply | tuple[Task, History]:
         m for m in turn if m is not measured and not (isinstance(m, Reply) and asked in m.calls)
     )
     data: dict[str, Any] = {} if measured.error else json.loads(measured.text)
-    each = data.get("each", ())  # of many robots only the first are told
+    each = data.get("each", ())  # of many robots only the first are listed
     places = {row["robot"]: row["place"] for row in each if len(each) == data["robots"]}
     return replace(task, standing=task.standing | {"places": places}), kept
 
@@ -171,7 +171,7 @@ def with_places(task: Task, turn: History) -> Reply | tuple[Task, History]:
 def _ranked(
     said: Mapping[str, str | None], standing: Standing
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The robots that are meant, and others that fit as well."""
+    """Return the robots that are meant, and others that fit as well."""
     need = AMOUNTS.get((said.get("n") or "").lower(), 1)
     skip = table_of("ordinals").get((said.get("rank") or "first").lower(), 1) - 1
     far = _scores(str(said["way"]).lower(), standing)
@@ -185,14 +185,14 @@ def _ranked(
 
 
 def _in_places(robots: Sequence[str]) -> list[str]:
-    """Robots in an order in which the third option is robot 3, if that is one of them."""
+    """Order robots so that, say, the third option is robot 3 if that is one of them."""
     own = {int(r): r for r in robots if r.isdecimal() and int(r) <= len(robots)}
     rest = iter([robot for robot in robots if robot not in own.values()])
     return [own.get(k) or next(rest) for k in range(1, len(robots) + 1)]
 
 
 def _scores(way: str, standing: Standing) -> dict[str, float]:
-    """How far each robot is towards a side or corner, or in the middle, px."""
+    """Return how far each robot is towards a side or corner, or in the middle, px."""
     places = standing.places or {}
     x, y = (sum(at[k] for at in places.values()) / max(len(places), 1) for k in (0, 1))
     if re.fullmatch(MIDDLE, way):
@@ -204,5 +204,5 @@ def _scores(way: str, standing: Standing) -> dict[str, float]:
 
 
 def _called(robots: Sequence[str]) -> str:
-    """Robots by their numbers."""
+    """Return robots named by their numbers: "robots 2 and 3"."""
     return f"robot{'s' * (len(robots) > 1)} {listed(robots)}"

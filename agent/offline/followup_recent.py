@@ -1,6 +1,6 @@
-"""Robots that were moved by name a moment ago, and are spoken of as "those two" or "them" now.
+"""References to robots that the last change named: "those two" or "them".
 
-"Those two" is put into numbers; "them" may be all of the team as well, so which is asked.
+"Those two" is replaced by their numbers; "them" may also be the whole team, so a question is asked.
 """
 
 import re
@@ -29,21 +29,21 @@ ALL = re.compile(r"\b(?:all|every\w*|whole|team|ring|circle|row|formation)\b", r
 
 
 def recent_robots(standing: Standing) -> list[int]:
-    """The robots that the last change was about, where it named several and nothing else."""
+    """Return the robots of the last change if each of its edits names some; else none."""
     named = [_named_in(edit) for edit in standing.edits]
     robots = {r for row in named for r in row if str(r) in standing.robots}
     return sorted(robots) if all(named) and len(robots) > 1 else []
 
 
 def _named_in(edit: Mapping[str, Any]) -> list[int]:
-    """The robots that an edit names; `robots` may be a mere number of them."""
+    """Return the robots that an edit names; `robots` may also be just a count."""
     several: object = edit.get("robots")
     row = cast("list[int]", several) if isinstance(several, list) else []
     return [*row, *(edit[key] for key in ("robot", "a", "b") if key in edit)]
 
 
 def with_numbers(words: str, standing: Standing) -> str:
-    """The words with the numbers of robots for "those two"."""
+    """Return the words with "those two" replaced by the robots' numbers."""
     robots = recent_robots(standing)
 
     def numbers(match: re.Match[str]) -> str:
@@ -57,10 +57,10 @@ def with_numbers(words: str, standing: Standing) -> str:
 def all_or_those(
     words: str, meant: Followup, standing: Standing, read: Callable[[str], Followup]
 ) -> Followup:
-    """What is meant, or the question whether "them" is all robots or those moved just now.
+    """Return what is meant, or the question whether "them" is all robots or those just moved.
 
     Args:
-        read: reads words; what it does not understand is not offered.
+        read: reads words; the question is only asked if it reads both options as edits.
     """
     robots, named = recent_robots(standing), THEM.search(words)
     whole = [e for e in meant.edits if "robot" not in e and "robots" not in e]

@@ -1,4 +1,4 @@
-"""From a frame to edits of how robots are arranged, on which sides, and of gaps in their ring."""
+"""Edits of how robots are arranged, on which sides, and of gaps in their ring."""
 
 import re
 from dataclasses import replace
@@ -13,7 +13,7 @@ from .followup_edits import (
     SIDES,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     bare_length,
     factor_of,
@@ -24,18 +24,18 @@ from .followup_frames import Slots
 from .followup_teams import count, group_of, target, whole
 
 PUSHING = re.compile(r"\b(?:move|shift|nudge|push|pull|slide|drag)\b", re.IGNORECASE)
-"""With these "all right" is a way to go, no side to be on."""
+"""Verbs with which "all right" is a direction, not a side to stand on."""
 
 
 EACH_CORNER = re.compile(r"\b(?:each|every)\b.*\bcorner", re.IGNORECASE)
 STRAIGHT = re.compile(r"\bstraight (?:row|line)\b", re.IGNORECASE)
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
 WHOLE = re.compile(r"\b(?:ring|circle|row|line|formation|v|u|star|wedge|arc)\b", re.IGNORECASE)
-"""What all robots together are called: its width is not that of a gap."""
+"""Words for the whole formation, whose width is not that of a gap."""
 
 
-def sides(slots: Slots, said: Said) -> Effects:
-    """Only on one side, or one side left free."""
+def sides(slots: Slots, said: Utterance) -> Effects:
+    """Put robots only on some sides, or leave sides free."""
     named = [SIDE_OF.get(s, s) for s in (*slots.get("flank", ()), *slots.get("side", ()))]
     without = "neg" in slots or "free" in slots
     if "flank" not in slots and PUSHING.search(said.words):
@@ -49,8 +49,8 @@ def sides(slots: Slots, said: Said) -> Effects:
     return [{"kind": "side", "side": named[0]}]
 
 
-def opposite(slots: Slots, said: Said) -> Effects:
-    """The side opposite of the one that robots are on, or of the one that is open."""
+def opposite(slots: Slots, said: Utterance) -> Effects:
+    """Change to the side opposite the one that robots stand on, or that is open."""
     group = said.standing.groups[0]
     opening = group.get("opening_towards")
     if opening in OPPOSITE and (said.standing.relation in RINGS):
@@ -69,8 +69,8 @@ def opposite(slots: Slots, said: Said) -> Effects:
     return [{"kind": "sides", "only": [f"{OPPOSITE[side]}{space}{half}"]}]
 
 
-def not_that_side(slots: Slots, said: Said) -> Effects:
-    """The side last named left free."""
+def not_that_side(slots: Slots, said: Utterance) -> Effects:
+    """Leave the sides free that robots were last put on."""
     last = next((e for e in reversed(said.last) if "only" in e), None)
     named = list(last["only"]) if last else list(said.standing.groups[0].get("sides") or ())
     if not named:
@@ -81,8 +81,8 @@ def not_that_side(slots: Slots, said: Said) -> Effects:
     return [{"kind": "sides", "without": named}]
 
 
-def gap(slots: Slots, said: Said) -> Effects:
-    """An opening towards something, wider or narrower, or on the other side."""
+def gap(slots: Slots, said: Utterance) -> Effects:
+    """Leave a gap towards something, make it wider or narrower, or put it on the other side."""
     opening: Effect = {"kind": "opening"}
     slots.has("gap")
     if "opposite" in slots or "otherway" in slots:
@@ -124,21 +124,21 @@ def gap(slots: Slots, said: Said) -> Effects:
     return [opening | ({} if length is None else {"px": length})]
 
 
-def reopened(slots: Slots, said: Said) -> Effects:
-    """The gap that is there, towards something else."""
+def reopened(slots: Slots, said: Utterance) -> Effects:
+    """Turn an existing gap towards something else; None if there is none."""
     return gap(slots, said) if said.standing.groups[0].get("opening") is not None else None
 
 
-def reopened_now(slots: Slots, said: Said) -> Effects:
-    """The gap that the last change was about, towards something else."""
+def reopened_now(slots: Slots, said: Utterance) -> Effects:
+    """Turn the gap that the last change was about towards something else."""
     about = bool(said.last) and said.last[-1]["kind"] == "opening"
     return reopened(slots, said) if about else None
 
 
-def sided(slots: Slots, said: Said) -> Effects:
-    """A side alone: the one robots stand on, or the gap is on."""
+def sided(slots: Slots, said: Utterance) -> Effects:
+    """Read a bare side: the one that robots are to stand on, or that the gap is to be on."""
     side = str(slots["side"][0])
-    moved = said.denies and not said.standing.edits  # else "left" is a way to go
+    moved = said.denies and not said.standing.edits  # else "left" is a direction
     moved = moved or re.search(r"\bnot\b", said.line, re.IGNORECASE) is not None
     group = said.standing.groups[0]
     if (
@@ -154,8 +154,8 @@ def sided(slots: Slots, said: Said) -> Effects:
     return [{"kind": "sides", "only": [side]}] if group.get("sides") else None
 
 
-def wider(slots: Slots, said: Said) -> Effects:
-    """Wider alone: the gap, where there is one; so wide from left to right."""
+def wider(slots: Slots, said: Utterance) -> Effects:
+    """Make it wider or narrower: the gap if there is one, else the width or the spacing."""
     if said.standing.groups[0].get("opening") is not None and not WHOLE.search(said.words):
         return gap(slots, said)
     if "px" in slots:
@@ -170,10 +170,10 @@ def wider(slots: Slots, said: Said) -> Effects:
     return ask("What should be narrower?", "closer", "closer together")
 
 
-def close(slots: Slots, said: Said) -> Effects:
-    """The whole ring again, without an opening; "no gap, back" takes the last one back."""
+def close(slots: Slots, said: Utterance) -> Effects:
+    """Close the ring again; "no gap, back" takes back the last change if that opened it."""
     slots.has("relation")
-    to_none = BACK_TO.search(said.words) is not None  # an earlier gap may stand before the last
+    to_none = BACK_TO.search(said.words) is not None  # the gap before the last change may remain
     if slots.has("back", "undo") and said.standing.changes and not to_none:
         opened = [e["kind"] for e in said.standing.edits] == ["opening"]
         return [{"kind": "undo", "steps": 1}] if opened else [{"kind": "close"}]
@@ -182,16 +182,16 @@ def close(slots: Slots, said: Said) -> Effects:
     return [{"kind": "close"}]
 
 
-def closed_with(slots: Slots, said: Said) -> Effects:
-    """The whole ring again, of so many robots."""
+def closed_with(slots: Slots, said: Utterance) -> Effects:
+    """Close the ring with a given number of robots."""
     counted = count(slots, replace(said, phrases=()))
     if counted is None:
         return None
     return [*(close(slots, said) or ()), *(e for e in counted if e["kind"] != "talk")]
 
 
-def add_on_side(slots: Slots, said: Said) -> Effects:
-    """So many more on one side: of the row that stands there, else it is asked."""
+def add_on_side(slots: Slots, said: Utterance) -> Effects:
+    """Add robots on one side: to the row that stands there, else ask."""
     n, groups = whole(slots), said.standing.groups
     side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]))
     slots.has("more", "add", "onword")
@@ -204,13 +204,13 @@ def add_on_side(slots: Slots, said: Said) -> Effects:
     return ask(question, f"{n} more", f"{n} more, all only on the {side} side")
 
 
-def opened(slots: Slots, said: Said) -> Effects:
-    """A cage becomes a ring that is open."""
+def opened(slots: Slots, said: Utterance) -> Effects:
+    """Turn a cage into an open ring; leave a gap in any other arrangement."""
     return [{"kind": "open"}] if said.standing.relation == "cage" else [{"kind": "opening"}]
 
 
-def widened(slots: Slots, said: Said) -> Effects:
-    """The one side that was left free is stood on too."""
+def widened(slots: Slots, said: Utterance) -> Effects:
+    """Close the ring by standing on the one side that was left free."""
     side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]), "")
     taken = list(said.standing.groups[0].get("sides") or ())
     slots.has("add", "again", "close", "back", "too")
@@ -218,8 +218,8 @@ def widened(slots: Slots, said: Said) -> Effects:
     return [{"kind": "close"}] if filled and {*taken, side} == {*SIDES} != {*taken} else None
 
 
-def cage(slots: Slots, said: Said) -> Effects:
-    """Nothing gets out, as close in as that takes."""
+def cage(slots: Slots, said: Utterance) -> Effects:
+    """Make a cage that nothing gets out of; with "as close", at the distance that takes."""
     if "radial" in slots and "asclose" not in slots:
         return None
     if "asclose" in slots:
@@ -228,8 +228,8 @@ def cage(slots: Slots, said: Said) -> Effects:
     return [{"kind": "escape-proof"}]
 
 
-def arrange(slots: Slots, said: Said) -> Effects:
-    """Another arrangement of the same robots."""
+def arrange(slots: Slots, said: Utterance) -> Effects:
+    """Put the same robots in another arrangement."""
     named = list(dict.fromkeys(slots["relation"]))
     named = [r for r in named if r != "around"] or named
     slots.has("back", "only", "onword")
@@ -252,15 +252,15 @@ def arrange(slots: Slots, said: Said) -> Effects:
         return [{"kind": "talk", "about": "already"}]
     demands = group_of(relation, slots)
     if len(said.standing.targets) > len(said.standing.groups) and len(current) == 1:
-        demands["targets"] = current  # of two things one
+        demands["targets"] = current  # one of two things
     edits.append({"kind": "arrange", "demands": demands})
     if "px" in slots:
         edits.append({"kind": "distance", "px": float(slots["px"][0])})
     return edits
 
 
-def _straight(slots: Slots, said: Said) -> Effects:
-    """A straight line beside the thing; a row goes along its outline, however that bends."""
+def _straight(slots: Slots, said: Utterance) -> Effects:
+    """Form a straight line beside the thing; a row would follow its outline, however it bends."""
     named = str((slots.get("flank") or slots.get("side") or [""])[0])
     where = PLACES.get(named) or (None if named else said.standing.beside)
     if slots.has("thing", "there", "other", "px", "away"):
@@ -271,8 +271,8 @@ def _straight(slots: Slots, said: Said) -> Effects:
     return [{"kind": "arrange", "demands": {"relation": "shape", "shape": shape}}]
 
 
-def arranged(slots: Slots, said: Said) -> Effects:
-    """Another arrangement, of so many robots."""
+def arranged(slots: Slots, said: Utterance) -> Effects:
+    """Put a given number of robots in another arrangement."""
     n = whole(slots)
     if n is not None and EACH_CORNER.search(said.words):
         n *= 4

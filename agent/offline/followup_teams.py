@@ -1,4 +1,4 @@
-"""From a frame to edits of who stands where: numbers, teams, sides, gaps and arrangements."""
+"""Edits of how many robots there are, of which leave or swap, and of teams and their things."""
 
 import re
 
@@ -8,7 +8,7 @@ from .followup_edits import (
     SIDE_OF,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     listed,
     refuse,
@@ -22,28 +22,28 @@ PLACING = re.compile(
     r"(?=.*\b(?:robot|bot|drone|rover)s?\b).*\b(?:put|place|surround|position|station|arrange)\b",
     re.IGNORECASE | re.DOTALL,
 )
-"""Robots, a number of them, a thing and such a word make a new instruction."""
+"""A verb that, with robots, a number of them and a thing, makes a new instruction."""
 ALIKE = re.compile(r"\b(?:same|too|also|as well|likewise)\b", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 DIRECTED = re.compile(r"^\W*(?:\w+ )?(?:(?P<up>up)|down) to\b", re.IGNORECASE)
-"""More or fewer than there are: "up to 9", "go down to five"."""
+"""Words that say whether the number goes up or down: "up to 9", "go down to five"."""
 BACK_TO = re.compile(r"\bback to\b", re.IGNORECASE)
 SOME_OF = re.compile(r"\bof (?:them|these|those|the robots)\b.*\bback\b", re.IGNORECASE)
 """After a number, it is one of robots that go somewhere, not of all there are to be."""
 LIKE_A_RING = ("around", "cage", "corners", "shape")
-"""Arrangements about a thing, which "around" the next one keeps."""
+"""Arrangements about a thing that "around" another thing keeps."""
 
 
 def whole(slots: Slots) -> int | None:
-    """The number said, where it is one of robots; "a robot" is one."""
+    """Return the number given, where it can count robots, else None; "a robot" is 1."""
     if "num" not in slots and "lone" in slots:
         return 1
     number = slots.get("num", [0])[0]
     return int(number) if number == int(number) and number > 0 else None
 
 
-def add_some(slots: Slots, said: Said) -> Effects:
-    """So many more."""
+def add_some(slots: Slots, said: Utterance) -> Effects:
+    """Add a number of robots."""
     n = whole(slots)
     if n is not None and said.count + n > MAX_ROBOTS:
         return refuse(
@@ -58,8 +58,8 @@ def add_some(slots: Slots, said: Said) -> Effects:
     return [{"kind": "add", "n": n}]
 
 
-def remove_some(slots: Slots, said: Said) -> Effects:
-    """So many fewer, or a share of them."""
+def remove_some(slots: Slots, said: Utterance) -> Effects:
+    """Remove a number or a share of the robots."""
     n = said.count // SHARES[slots["portion"][0]] if "portion" in slots else whole(slots)
     if n is None:
         return None
@@ -70,8 +70,8 @@ def remove_some(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "n": n}]
 
 
-def leave(slots: Slots, said: Said) -> Effects:
-    """Robots that are named leave; the others close up unless their places stay empty."""
+def leave(slots: Slots, said: Utterance) -> Effects:
+    """Remove the robots named; the others close up unless the places are to stay empty."""
     robots = [r for named in slots["robots"] for r in named]
     if len(set(robots)) >= said.count:
         return refuse("All robots would leave: nothing would be left to place.")
@@ -79,8 +79,8 @@ def leave(slots: Slots, said: Said) -> Effects:
     return [{"kind": "skip" if slots.has("empty", "stay") else "remove", "robots": robots}]
 
 
-def leave_others(slots: Slots, said: Said) -> Effects:
-    """All but those named leave."""
+def leave_others(slots: Slots, said: Utterance) -> Effects:
+    """Remove all robots but those named."""
     slots.has("all")
     words = said.words.lower()
     if words.find("stay") > max(words.find(w) for w in ("leave", "go", "away", "out")):
@@ -90,8 +90,8 @@ def leave_others(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "robots": others}] if others else None
 
 
-def leave_side(slots: Slots, said: Said) -> Effects:
-    """The row on one side leaves."""
+def leave_side(slots: Slots, said: Utterance) -> Effects:
+    """Remove the row on one side."""
     side = SIDE_OF.get(str((slots.get("flank") or slots.get("side") or [""])[0]))
     rows = [(k, g) for k, g in enumerate(said.standing.groups, 1) if g.get("side") == side]
     slots.has("leave", "remove", "off", "away", "radial")
@@ -100,14 +100,14 @@ def leave_side(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "n": rows[0][1]["robots"], "group": rows[0][0]}]
 
 
-def leave_rest(slots: Slots, said: Said) -> Effects:
-    """The rest leaves, where it was said before how many there are to be."""
+def leave_rest(slots: Slots, said: Utterance) -> Effects:
+    """Do nothing for "the rest leaves" if the line has set the number of robots already."""
     counted = any(e["kind"] == "count" for e in said.before)
     return [{"kind": "talk", "about": "already"}] if counted else None
 
 
-def emptied(slots: Slots, said: Said) -> Effects:
-    """Nobody about one of several things: its team leaves."""
+def emptied(slots: Slots, said: Utterance) -> Effects:
+    """Remove the team about one of several things."""
     named = str((slots.get("current") or [""])[0])
     groups = list(enumerate(said.standing.groups, 1))
     here = [(k, g) for k, g in groups if g.get("targets") == [named]]
@@ -116,14 +116,14 @@ def emptied(slots: Slots, said: Said) -> Effects:
     return [{"kind": "remove", "n": here[0][1]["robots"], "group": here[0][0]}]
 
 
-def some(slots: Slots, said: Said) -> Effects:
-    """Some of them go elsewhere: how many is asked."""
+def some(slots: Slots, said: Utterance) -> Effects:
+    """Ask how many, where "some" of the robots are to go elsewhere."""
     slots.used.update(slots)
     return ask(f'How many of them, in "{said.words}"? Say a number.')
 
 
-def count(slots: Slots, said: Said) -> Effects:
-    """So many in all; as many as needed, or as fit."""
+def count(slots: Slots, said: Utterance) -> Effects:
+    """Set the number of robots in all, or multiply it."""
     slots.has("toomany", "back", "remove", "less", "only")
     n = (
         round(said.count * float(slots["ratio_count"][0]))
@@ -146,10 +146,10 @@ def count(slots: Slots, said: Said) -> Effects:
     return None if n is None or not kept or _rearranges(said) else [{"kind": "count", "robots": n}]
 
 
-def _rearranges(said: Said) -> bool:
-    """Whether another arrangement is named beside a number: "six around it", not "around six".
+def _rearranges(said: Utterance) -> bool:
+    """Return whether another arrangement is named beside a number: "six around it".
 
-    So is all of a ring where only a part of it is stood on.
+    "Around six" is none; the whole ring is one where robots stand on only a part of it.
     """
     stands = (said.standing.relation, *(LIKE_A_RING if said.standing.targets else ()))
     after = [c.kinds for c, _ in said.phrases[1:]] + [{}]
@@ -164,14 +164,14 @@ def _rearranges(said: Said) -> bool:
     )
 
 
-def needed(slots: Slots, said: Said) -> Effects:
-    """As many as close the ring."""
+def needed(slots: Slots, said: Utterance) -> Effects:
+    """Set as many robots as close the ring."""
     slots.has("add", "close", "closeq", "relation", "again")
     return [{"kind": "count", "robots": "held" if slots.has("escape") else "needed"}]
 
 
-def fit(slots: Slots, said: Said) -> Effects:
-    """As many as there is room for."""
+def fit(slots: Slots, said: Utterance) -> Effects:
+    """Set as many robots as there is room for."""
     slots.has("apart", "spacing", "add")
     spaced: list[Effect] = (
         [{"kind": "spacing", "px": float(slots["px"][0])}] if "px" in slots else []
@@ -179,8 +179,8 @@ def fit(slots: Slots, said: Said) -> Effects:
     return [*spaced, {"kind": "count", "robots": "fit"}]
 
 
-def how_many_more(slots: Slots, said: Said) -> Effects:
-    """More, but not how many."""
+def how_many_more(slots: Slots, said: Utterance) -> Effects:
+    """Ask how many robots more."""
     return ask(
         "How many more robots?",
         "one more robot",
@@ -189,13 +189,13 @@ def how_many_more(slots: Slots, said: Said) -> Effects:
     )
 
 
-def how_many_fewer(slots: Slots, said: Said) -> Effects:
-    """Fewer, but not how many."""
+def how_many_fewer(slots: Slots, said: Utterance) -> Effects:
+    """Ask how many robots fewer."""
     return ask("How many robots fewer?", "take one robot away", "take two robots away")
 
 
-def swap(slots: Slots, said: Said) -> Effects:
-    """Two robots take each other's place."""
+def swap(slots: Slots, said: Utterance) -> Effects:
+    """Swap the places of two robots."""
     robots = [r for named in slots.get("robots", ()) for r in named] + [
         int(n) for n in slots.get("num", ())
     ]
@@ -215,8 +215,8 @@ def swap(slots: Slots, said: Said) -> Effects:
     return [{"kind": "swap", "a": robots[0], "b": robots[1]}]
 
 
-def target(slots: Slots, said: Said) -> Effects:
-    """The same around another thing."""
+def target(slots: Slots, said: Utterance) -> Effects:
+    """Move the same arrangement to another thing."""
     slots.has("back")
     to = where(slots, said)
     if isinstance(to, list):
@@ -251,8 +251,8 @@ def target(slots: Slots, said: Said) -> Effects:
     )
 
 
-def not_this(slots: Slots, said: Said) -> Effects:
-    """The same around another thing, not around this one."""
+def not_this(slots: Slots, said: Utterance) -> Effects:
+    """Move the same arrangement from this thing to another one."""
     this = str((slots.get("current") or slots.get("thing") or [""])[0])
     if "there" not in slots or (this.startswith("?") and len(said.standing.targets) > 1):
         return None
@@ -260,8 +260,8 @@ def not_this(slots: Slots, said: Said) -> Effects:
     return to if isinstance(to, list) else [{"kind": "target", "to": to}]
 
 
-def split(slots: Slots, said: Said) -> Effects:
-    """Some there, the rest here."""
+def split(slots: Slots, said: Utterance) -> Effects:
+    """Move some of the robots to another thing; the rest stays."""
     named = [r for robots in slots.get("robots", ()) for r in robots]
     relation = (slots.get("relation") or ["around"])[0]
     slots.has("merge", "here", "rest", "back", "undo")
@@ -289,8 +289,8 @@ def split(slots: Slots, said: Said) -> Effects:
     return [moved | {"robots": some} | stays]
 
 
-def _number_going(slots: Slots, said: Said) -> int | None:
-    """How many of the robots go elsewhere; None where that is not said, or not so many there."""
+def _number_going(slots: Slots, said: Utterance) -> int | None:
+    """Return how many robots go elsewhere; None where that is not given, or more than there are."""
     if "portion" in slots:
         part = said.count // SHARES[slots["portion"][0]]
         return None if "num" in slots else max(part, 1)
@@ -302,8 +302,8 @@ def _number_going(slots: Slots, said: Said) -> int | None:
     return n if len(set(slots["num"])) == 1 and n is not None and n <= said.count else None
 
 
-def split_ask(slots: Slots, said: Said) -> Effects:
-    """Two teams, but not where the second is to stand."""
+def split_ask(slots: Slots, said: Utterance) -> Effects:
+    """Make two teams; ask where the second is to stand unless only one other thing is known."""
     others = said.standing.others()
     if len(others) == 1:
         return [{"kind": "target", "to": others[0], "robots": said.count // 2}]
@@ -313,24 +313,24 @@ def split_ask(slots: Slots, said: Said) -> Effects:
     )
 
 
-def merge(slots: Slots, said: Said) -> Effects:
-    """All in one team again."""
+def merge(slots: Slots, said: Utterance) -> Effects:
+    """Join all teams into one."""
     if len(said.standing.groups) < 2:
         return [{"kind": "talk", "about": "already"}]
     to = (slots.get("thing") or slots.get("current") or [None])[0]
     return [{"kind": "merge"} | ({} if to is None else {"to": to})]
 
 
-def merge_to(slots: Slots, said: Said) -> Effects:
-    """All around one thing: one team again, where there are several."""
+def merge_to(slots: Slots, said: Utterance) -> Effects:
+    """Put all robots around one thing, as one team where there are several."""
     if len(said.standing.groups) < 2:
         return target(slots, said)
     slots.has("back", "relation", "undo")
     return [{"kind": "merge", "to": slots["thing"][0]}]
 
 
-def even_out(slots: Slots, said: Said) -> Effects:
-    """The gaps that were left are shared out."""
+def even_out(slots: Slots, said: Utterance) -> Effects:
+    """Even out the gaps that were left."""
     slots.has("rest")
     if slots.get("num", [said.count]) != [said.count]:
         return None
@@ -338,28 +338,28 @@ def even_out(slots: Slots, said: Said) -> Effects:
     return [{"kind": "arrange", "demands": demands}]
 
 
-def few_away(slots: Slots, said: Said) -> Effects:
-    """Two away: so few are robots, not pixels."""
+def few_away(slots: Slots, said: Utterance) -> Effects:
+    """Read "two away" as robots to remove: a number this small is not in pixels."""
     few = slots["num"][0] < LEAST_BARE
     return remove_some(slots, said) if few else None
 
 
-def swap_again(slots: Slots, said: Said) -> Effects:
-    """Two more robots, after others were swapped, or where it was asked which are to."""
+def swap_again(slots: Slots, said: Utterance) -> Effects:
+    """Swap two robots if others were swapped last or the last words were about a swap."""
     asked = [k for c in chunks_of(said.standing.said, said.standing) for k in c.kinds]
     swapped = said.last and said.last[-1]["kind"] == "swap"
     return swap(slots, said) if swapped or "swap" in asked else None
 
 
-def add_one(slots: Slots, said: Said) -> Effects:
-    """Another one: a robot, where robots were added last."""
+def add_one(slots: Slots, said: Utterance) -> Effects:
+    """Add another robot if robots were added last, else ask whether a robot or a thing is meant."""
     if any(e["kind"] == "add" for e in said.last):
         return [{"kind": "add", "n": 1}]
     return ask("Another robot, or another thing?", "one more robot", "around the other one")
 
 
 def group_of(relation: str, slots: Slots) -> Effect:
-    """The fields of the group of an arrangement; a circle, about a thing of any shape, is drawn."""
+    """Return the fields of an arrangement's group; a circle is drawn about any thing."""
     if relation == "circle":
         return {"relation": "shape", "shape": {"kind": "circle", "where": "around"}}
     group: Effect = {"relation": relation}

@@ -1,4 +1,4 @@
-"""Which thing or robot a phrase of a follow-up names, among what stands."""
+"""Resolves phrases of a follow-up to the known things and robots that they name."""
 
 import re
 from collections.abc import Sequence
@@ -11,20 +11,20 @@ from .phrases import table
 from .standing import Standing
 
 POINTING = ("that", "this", "here")
-"""Words that mean what is pointed at, where something is."""
+"""Words that mean what is pointed at, if something is."""
 UNNAMED = ("thing pointed at", "the thing pointed at")
-"""What a thing is called that nobody named."""
+"""How the label of a thing begins that nobody named."""
 SIDES = {"upper": "top", "lower": "bottom", "leftmost": "left", "rightmost": "right"}
 
 
 def pointing_at(words: str) -> str:
-    """Words said while something new is pointed at, where "it" is that: as "this"."""
+    """Return words with "it" as "this", as something new is pointed at while they are said."""
     shown = re.search(r"\b(?:this|that|here|there|these|t[0-9]+)\b", words, re.IGNORECASE)
     return words if shown else re.sub(r"\bit\b", "this", words, count=1)
 
 
 def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
-    """A phrase with its thing as an id, where it is known; one of the plan's as `current`."""
+    """Return a phrase with a known thing as its id; a target of the plan becomes `current`."""
     kinds = dict(chunk.kinds)
     pointed = bool(standing.pointed) or standing.place is not None
     word = text[chunk.start : chunk.end].lower()
@@ -34,7 +34,7 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     if "lone" in kinds and len(standing.robots) == 1:
         kinds["team"] = ""
     one = "first" in kinds and text[chunk.start : chunk.end].lower().endswith(" one")
-    if one and len(standing.things) > 1:  # the plan, or the thing
+    if one and len(standing.things) > 1:  # "the first one" may be a plan or a thing
         kinds["thing"] = standing.things[0][0]
     if "thing" in kinds:
         another = re.search(r"\banother $", text[: chunk.start], re.IGNORECASE)
@@ -51,12 +51,12 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
 
 
 def known(phrase: str, standing: Standing) -> str:
-    """The id of a thing that words mean among all that are known, or the words after "?"."""
+    """Return the id of the known thing that words mean, or "?" and the words if there is none."""
     return _id_of(phrase, False, replace(standing, contract={"groups": []}))
 
 
 def stood_about(things: Sequence[str], standing: Standing) -> list[str]:
-    """Ids of the measured things that phrases name, if all do; of the first group's with none."""
+    """Return ids of the things named, [] if one is not known; the first group's without names."""
     if not things:
         return list(standing.groups[0].get("targets", ()))
     names = [known(re.sub(r"^(?:the|this|that) ", "", words), standing) for words in things]
@@ -64,7 +64,7 @@ def stood_about(things: Sequence[str], standing: Standing) -> list[str]:
 
 
 def _is_shown(chunk: Chunk, text: str) -> bool:
-    """Whether a phrase means what is pointed at: "this house", "the house over here"."""
+    """Return whether a phrase means what is pointed at: "this house", "the house over here"."""
     first, *rest = text[chunk.start : chunk.end].lower().split()
     known = all(thing_phrase([word], 0) is not None for word in rest)
     shown = first in ("this", "that") and known
@@ -72,7 +72,7 @@ def _is_shown(chunk: Chunk, text: str) -> bool:
 
 
 def _id_of(phrase: str, other: bool, standing: Standing) -> str:
-    """The id of a known thing, or the words after "?" for it to be found."""
+    """Return the id of a known thing, or "?" and the words if it has to be found."""
     if re.fullmatch(r"[tc][0-9]+", phrase):
         return phrase if phrase[0] == "t" else f"?{phrase}"
     words = set(re.findall(r"[a-z]+", phrase)) - {"one", "the", "thing", "object", "of", "two"}
@@ -102,7 +102,7 @@ def _id_of(phrase: str, other: bool, standing: Standing) -> str:
 
 
 def impossible(chunks: Sequence[Chunk], standing: Standing) -> str:
-    """Why what is named is not there or cannot be measured, and what would do; "" where it is."""
+    """Return why a named thing or length cannot be used, and what can be said; "" if all can."""
     there = [int(r) for r in standing.robots if r.isdecimal()]
     known = {*(t for t, _ in standing.things), *standing.pointed, *standing.targets}
     for chunk in chunks:

@@ -1,4 +1,4 @@
-"""From a frame to what a turn does beside edits, and to edits that follow from the last ones."""
+"""What a turn does beside edits (undo, go, questions), and edits that need the last ones."""
 
 import re
 
@@ -6,7 +6,7 @@ from .followup_edits import (
     ROWS,
     Effect,
     Effects,
-    Said,
+    Utterance,
     ask,
     centre_of,
     is_noun,
@@ -20,11 +20,11 @@ from .followup_words import chunks_of
 
 PUT_BACK = re.compile(r"\b(?:put|bring|add|give|take)\b.*\bback\b", re.IGNORECASE)
 STATED, WIDEST = 2.0, 0.11
-"""Widest range of a distance that was stated: so many px, or this share of it."""
+"""Widest range of a clearance set by a stated distance: px, or a share of the distance."""
 CHOSEN = re.compile(r"\bnot\b|\b(?:then|sorry|i mean(?:t)?|rather|instead)\W*$", re.IGNORECASE)
-"""What says that something is chosen: "six then", "7, not 5"."""
+"""Words that mark a choice: "six then", "7, not 5"."""
 STATED_BY = ("distance", "spacing", "opening")
-"""Kinds of edits by a length that is meant exactly."""
+"""Kinds of edits by an exact length."""
 STEPS = re.compile(r"\b(?:steps?|changes?|edits?|times|plans?|moves)\b", re.IGNORECASE)
 CALLED = {
     "swap": ("swap",),
@@ -41,7 +41,7 @@ CALLED = {
     "face": ("heading",),
     "dir": ("shift", "place"),
 }
-"""What changes are called, by the kinds of phrases that say it, and of which kinds they are."""
+"""Kinds of phrases that name a change, and the kinds of edits that they may mean."""
 OF_THEM = re.compile(r"\bof them\b|\b(?:robots|bots|drones|units)\b", re.IGNORECASE)
 METRES = re.compile(r"\bmet(?:re|er)s?\b", re.IGNORECASE)
 AT_LEAST = re.compile(
@@ -64,8 +64,8 @@ SOME = re.compile(r"\b(?:any|anyone|anybody|some)\b", re.IGNORECASE)
 MOVES = "undo", "further out", "closer", "turn it 30 degrees"
 
 
-def _times(slots: Slots, said: Said) -> int:
-    """How many steps: as many as are said, or as often as it is said: "undo, undo"."""
+def _times(slots: Slots, said: Utterance) -> int:
+    """Return the number of steps, as given or as often as it is repeated: "undo, undo"."""
     if "num" in slots or "twice" in slots:
         return int(slots.get("num", slots.get("twice", [1]))[0])
     parts = re.split(r"[,;.!]|\band\b|\bthen\b", said.words.lower())
@@ -73,8 +73,8 @@ def _times(slots: Slots, said: Said) -> int:
     return max(1, len([w for w in words if w])) if len({*words} - {""}) == 1 else 1
 
 
-def undo(slots: Slots, said: Said) -> Effects:
-    """So many steps back."""
+def undo(slots: Slots, said: Utterance) -> Effects:
+    """Go a number of steps back."""
     if "num" in slots and SOME_OF.search(said.words):
         return None
     steps, there = _times(slots, said), said.standing.changes
@@ -88,8 +88,8 @@ def undo(slots: Slots, said: Said) -> Effects:
     return [{"kind": "undo", "steps": steps}]
 
 
-def returned(slots: Slots, said: Said) -> Effects:
-    """Back to the last plan with an arrangement or a number of robots: "back to the circle"."""
+def returned(slots: Slots, said: Utterance) -> Effects:
+    """Go back to the last plan with an arrangement or number of robots: "back to the circle"."""
     named = {"around" if r == "circle" else r for r in slots.get("relation", ())}
     numbers = [int(n) for n in (*slots.get("num", ()), *(1 for _ in slots.get("lone", ())))]
     slots.has("undo", "back", "first", "again")
@@ -110,15 +110,15 @@ def returned(slots: Slots, said: Said) -> Effects:
     return count(Slots(num=numbers), said)
 
 
-def put_back(slots: Slots, said: Said) -> Effects:
-    """Robots as they stood before the last change, which was about them too."""
+def put_back(slots: Slots, said: Utterance) -> Effects:
+    """Put robots back to where they were before the last change, if that moved them too."""
     named = {r for row in slots["robots"] for r in row}
     moved = {e.get("robot") for e in said.standing.edits}
     return stay(slots, said) if {None, *named} & moved else None
 
 
-def undone(slots: Slots, said: Said) -> Effects:
-    """The last change taken back, where it is called by what it was: "undo the swap"."""
+def undone(slots: Slots, said: Utterance) -> Effects:
+    """Take back the last change if it is named by its kind ("undo the swap"), else ask."""
     names = {e for name in CALLED for e in CALLED[name] if name in slots}
     last = [str(e["kind"]) for e in said.standing.edits]
     if {*last} & names:
@@ -127,8 +127,8 @@ def undone(slots: Slots, said: Said) -> Effects:
     return ask(f"{what} Undo that?", "undo") if last else undo(Slots(), said)
 
 
-def kept(slots: Slots, said: Said) -> Effects:
-    """What stays as it is beside a change: the spacing, by a demand of its own."""
+def kept(slots: Slots, said: Utterance) -> Effects:
+    """Keep a quantity as it is beside a change; in a row the spacing takes an edit of its own."""
     of = str(slots["quantity"][0])
     if re.search(r"\b(?:keep\w*|same|leave|stays?|unchanged)\b", said.words, re.IGNORECASE) is None:
         return None
@@ -138,15 +138,15 @@ def kept(slots: Slots, said: Said) -> Effects:
     return [keeps or {"kind": "talk", "about": "already"}]
 
 
-def moved_back(slots: Slots, said: Said) -> Effects:
-    """A robot where it was before the last change, if that was about no other."""
+def moved_back(slots: Slots, said: Utterance) -> Effects:
+    """Put robots back to where they were before the last change, if that moved only them."""
     robots = {r for named in slots["robots"] for r in named}
     moved = {e.get("robot") for e in said.last}
     return undo(Slots(), said) if said.last and moved == robots and not said.before else None
 
 
-def unadded(slots: Slots, said: Said) -> Effects:
-    """Those that were added last leave again."""
+def unadded(slots: Slots, said: Utterance) -> Effects:
+    """Take back the robots that were added last."""
     slots.used.update(slots)
     counts = [e for e in said.last if e["kind"] in ("add", "count")]
     named = re.search(r"\b(?:those|them|these|they)\b", said.words, re.IGNORECASE)
@@ -154,14 +154,14 @@ def unadded(slots: Slots, said: Said) -> Effects:
     return undo(Slots(), said) if counts and named and fewer else None
 
 
-def dont(slots: Slots, said: Said) -> Effects:
-    """ "No, don't: like before"; "don't undo" is another matter."""
+def dont(slots: Slots, said: Utterance) -> Effects:
+    """Undo after "no, don't: like before", but not after "don't undo"."""
     called_off = re.match(r"\W*(?:don'?t|do not)\W*[,.;:!-]", said.words, re.IGNORECASE)
     return undo(slots, said) if called_off else None
 
 
-def redo(slots: Slots, said: Said) -> Effects:
-    """So many steps forward again."""
+def redo(slots: Slots, said: Utterance) -> Effects:
+    """Go a number of steps forward again."""
     steps = _times(slots, said)
     if said.standing.redo < steps and said.words.lower().split()[:2] == ["undo", "undo"]:
         return undo(Slots(num=[2]), said)
@@ -170,53 +170,53 @@ def redo(slots: Slots, said: Said) -> Effects:
     return [{"kind": "undo", "steps": -steps}]
 
 
-def first(slots: Slots, said: Said) -> Effects:
-    """The first plan."""
+def first(slots: Slots, said: Utterance) -> Effects:
+    """Go back to the first plan."""
     if not said.standing.steps:
         return refuse("No plan stands yet, so there is no first one to go back to.")
     return [{"kind": "undo", "to": "first"}]
 
 
-def restart(slots: Slots, said: Said) -> Effects:
-    """All over again: what is to be done is asked."""
+def restart(slots: Slots, said: Utterance) -> Effects:
+    """Start over: ask what is to be done."""
     return ask(
         "Starting over: which thing, which arrangement and how many robots?",
         "back to the first one",
     )
 
 
-def go(slots: Slots, said: Said) -> Effects:
-    """The robots move."""
+def go(slots: Slots, said: Utterance) -> Effects:
+    """Let the robots move."""
     return [{"kind": "go"}]
 
 
-def hold(slots: Slots, said: Said) -> Effects:
-    """Nothing moves until go; robots that are named stay."""
+def hold(slots: Slots, said: Utterance) -> Effects:
+    """Let nothing move until "go"; if robots are named, keep only those where they are."""
     return stay(slots, said) if "robots" in slots else [{"kind": "hold"}]
 
 
-def stay(slots: Slots, said: Said) -> Effects:
-    """Robots that are named stay where they are."""
+def stay(slots: Slots, said: Utterance) -> Effects:
+    """Keep the robots named where they are."""
     return [{"kind": "stay", "robots": [r for named in slots["robots"] for r in named]}]
 
 
-def rest_stays(slots: Slots, said: Said) -> Effects:
-    """All but those named before stay where they are."""
+def rest_stays(slots: Slots, said: Utterance) -> Effects:
+    """Keep all but the robots named before where they are."""
     return [{"kind": "rest"}]
 
 
-def keep(slots: Slots, said: Said) -> Effects:
-    """It stays as it is."""
+def keep(slots: Slots, said: Utterance) -> Effects:
+    """Change nothing, and report that it is so already."""
     return [{"kind": "talk", "about": "already"}]
 
 
-def steps(slots: Slots, said: Said) -> Effects:
-    """How many steps can be taken back."""
+def steps(slots: Slots, said: Utterance) -> Effects:
+    """Report how many steps can be taken back."""
     return [{"kind": "talk", "about": "steps"}]
 
 
-def bare(slots: Slots, said: Said) -> Effects:
-    """An amount alone: what it is of is asked."""
+def bare(slots: Slots, said: Utterance) -> Effects:
+    """Read an amount alone: a length or count if the last words tell which, else ask."""
     last = said.last[-1] if len(said.last) == 1 else {}
     exact = "px" in last and last["kind"] in STATED_BY
     if "px" in slots and exact and (said.denies or CHOSEN.search(said.line)):
@@ -237,8 +237,8 @@ def bare(slots: Slots, said: Said) -> Effects:
     return ask(f'What should change, in "{said.words}"?', *MOVES[1:])
 
 
-def _is_count(n: float, said: Said) -> bool:
-    """Whether a bare number is one of robots: they were counted last, or it corrects the first."""
+def _is_count(n: float, said: Utterance) -> bool:
+    """Return whether a bare number counts robots: they were counted last, or it corrects that."""
     before = chunks_of(said.standing.said, said.standing)
     if any("howmany" in c.kinds for c in before):
         return True
@@ -252,30 +252,30 @@ def _is_count(n: float, said: Said) -> bool:
     return (named or (counted and chosen and not far)) and len(said.standing.groups) < 2
 
 
-def _is_at_length(said: Said) -> bool:
-    """Whether robots keep a distance that was stated, and nothing else was said since."""
+def _is_at_length(said: Utterance) -> bool:
+    """Return whether robots keep a stated distance, and nothing else was changed since."""
     bounds = [g.get("clearance") or (0, 0) for g in said.standing.groups]
     others = {e["kind"] for e in said.last} - {"distance", "count", "add", "remove"}
     return not others and all(0 < high <= low + max(STATED, WIDEST * high) for low, high in bounds)
 
 
-def refuse_checks(slots: Slots, said: Said) -> Effects:
-    """Nothing moves uncertified."""
+def refuse_checks(slots: Slots, said: Utterance) -> Effects:
+    """Refuse to move robots without the checks."""
     return refuse(
         "Nothing moves without its checks; say what should change, and it is checked at once."
     )
 
 
-def refuse_through(slots: Slots, said: Said) -> Effects:
-    """No robot goes through the thing."""
+def refuse_through(slots: Slots, said: Utterance) -> Effects:
+    """Refuse to drive robots through the thing."""
     return refuse(
         "Robots do not go through a thing, they drive around it. Say where they should stand, "
         "then go."
     )
 
 
-def units(slots: Slots, said: Said) -> Effects:
-    """Lengths in metres, which take a scale."""
+def units(slots: Slots, said: Utterance) -> Effects:
+    """Give lengths in metres if the picture has a scale, else refuse."""
     if said.standing.metres_per_pixel is None:
         return refuse(
             "The picture has no scale, so lengths are px; give it with --metres-per-pixel."
@@ -283,16 +283,16 @@ def units(slots: Slots, said: Said) -> Effects:
     return [{"kind": "query", "about": "distance"}]
 
 
-def sides_free(slots: Slots, said: Said) -> Effects:
-    """Which sides no robots stand on."""
+def sides_free(slots: Slots, said: Utterance) -> Effects:
+    """Report which sides no robots stand on."""
     asks = "sideq" in slots or YES_OR_NO.match(said.line)
     return [{"kind": "talk", "about": "sides"}] if asks else None
 
 
-def _bound(slots: Slots, said: Said) -> Effect:
-    """What a distance is compared with, where it is asked whether robots keep it."""
+def _bound(slots: Slots, said: Utterance) -> Effect:
+    """Return what a distance is compared with, for a question whether robots keep it."""
     sign = ">" if AT_LEAST.search(said.line) else "<" if AT_MOST.search(said.line) else ""
-    if NOBODY.search(said.line):  # is nobody closer: are all as far
+    if NOBODY.search(said.line):  # "is nobody closer" asks whether all are as far
         sign = {">": "<", "<": ">", "": ""}[sign]
     neighbours = slots.has("apart", "spacing", "num")
     of = "neighbour_px" if neighbours else "target_px"
@@ -300,8 +300,8 @@ def _bound(slots: Slots, said: Said) -> Effect:
     return {"px": float(slots["px"][0]), "sign": sign, "of": of, "some": some}
 
 
-def asked(slots: Slots, said: Said, about: str) -> Effects:
-    """A question of the person's, answered by measures."""
+def asked(slots: Slots, said: Utterance, about: str) -> Effects:
+    """Read a question of the person's that measures answer; `about` is its topic."""
     robots = [r for named in slots.get("robots", ()) for r in named]
     metric = "unit" in slots and METRES.search(said.words)
     if metric and said.standing.metres_per_pixel is None:
@@ -324,8 +324,8 @@ def asked(slots: Slots, said: Said, about: str) -> Effects:
     ]
 
 
-def _things_asked(slots: Slots, said: Said, about: str) -> list[str] | None:
-    """The things asked about, of two the first stood about first; None where none can be told."""
+def _things_asked(slots: Slots, said: Utterance, about: str) -> list[str] | None:
+    """Return the things asked about, the first target before another; None if it is not clear."""
     slots.has("thing", "current")
     named = [str(c.kinds.get("thing", c.kinds.get("current", ""))) for c, _ in said.phrases]
     named = [known(name[1:], said.standing) if name[:1] == "?" else name for name in named]
@@ -341,8 +341,8 @@ def _things_asked(slots: Slots, said: Said, about: str) -> list[str] | None:
     return sorted(things, key=lambda thing: thing not in first)
 
 
-def _details(slots: Slots, said: Said, about: str) -> Effect:
-    """What else a question asks, and of what it is when that is not what its frame is called."""
+def _details(slots: Slots, said: Utterance, about: str) -> Effect:
+    """Return further fields of a query, with `about` if it differs from the frame's name."""
     if about == "distance":
         return {"about": "spacing"} if slots.has("spacing", "apart") else {}
     if about == "at":
@@ -357,8 +357,8 @@ def _details(slots: Slots, said: Said, about: str) -> Effect:
     return _bound(slots, said) if about == "bound" else {}
 
 
-def _nearest_to_what(slots: Slots, said: Said, robots: list[int]) -> Effects:
-    """Which robot is the nearest to another one, a point or a centre."""
+def _nearest_to_what(slots: Slots, said: Utterance, robots: list[int]) -> Effects:
+    """Ask which robot is nearest to (or furthest from) another one, a point or a centre."""
     query: Effect = {"kind": "query", "about": "near", "most": slots["nearest"][0]}
     slots.has("relation", "inward")
     if robots:

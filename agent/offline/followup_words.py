@@ -1,7 +1,7 @@
 """The words of a follow-up as phrases of known kinds: robots, things, amounts, directions, fillers.
 
-Every word is in one phrase. A phrase may be of several kinds, "left" a direction and a side; what
-takes it decides. A word of no kind is kept as unknown, so that it is asked about.
+Every word is in one phrase. A phrase may be of several kinds, as "left" is a direction and a side;
+the frame that takes it decides. A word of no kind is "unknown", so that the person is asked.
 """
 
 import re
@@ -40,7 +40,7 @@ SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "r
 
 @dataclass(frozen=True)
 class Chunk:
-    """A phrase: its kinds, each with what it says, and where it stands, in characters.
+    """A phrase: its kinds, each with its value, and its start and end in characters.
 
     Kinds beside those of followups.yaml: robots (numbers), num, px, m, angle, share, point, thing
     (its words, or an id), team, it, filler, sep, correction, unknown.
@@ -59,7 +59,7 @@ class _Word:
 
 
 def chunks_of(text: str, standing: Standing) -> tuple[Chunk, ...]:
-    """The phrases of what was said, in order."""
+    """Return the phrases of a text, in order."""
     lowered = re.sub(r"(?<=[a-z])-(?=[a-z])", " ", text.lower().replace("\u2019", "'"))
     words = [_Word(m[0], m.start(), m.end()) for m in WORD.finditer(lowered)]
     points = list(POINT.finditer(lowered))
@@ -91,7 +91,7 @@ class _Reader:
         self.plain = [w.text for w in words]
 
     def read(self, at: int) -> tuple[Chunk, int]:
-        """The longest phrase that begins at a word, and the word after it."""
+        """Return the longest phrase that begins at a word, and the index of the word after it."""
         known, end = self._known(at)
         readings = [
             self._point(at),
@@ -112,7 +112,7 @@ class _Reader:
         return Chunk(kinds, self.words[at].start, self.words[end - 1].end), end
 
     def _known(self, at: int) -> tuple[dict[str, Any], int]:
-        """The longest phrase of followups.yaml; articles in it count for nothing."""
+        """Return the longest phrase of followups.yaml and its end; articles in it are ignored."""
         found: dict[str, Any] = {}
         end, spoken, k = at, list[str](), at
         while k < len(self.words) and len(spoken) < longest():
@@ -128,7 +128,7 @@ class _Reader:
         return {k: v for k, v in found.items() if not (new and k == "team")}, end
 
     def _until(self, at: int, end: int) -> int:
-        """The word after a place in the text."""
+        """Return the index of the first word at or after a position in the text."""
         return next(
             (k for k in range(at, len(self.words)) if self.words[k].start >= end), len(self.words)
         )
@@ -146,7 +146,7 @@ class _Reader:
         return {"thing": match[0]}, self._until(at, match.end())
 
     def _in_order(self, at: int) -> tuple[dict[str, Any], int] | None:
-        """ "the second", "the first thing": of several things known, in their order."""
+        """Read an ordinal among several known things: "the second", "the first thing"."""
         start = at + (self.plain[at] in ARTICLES)
         if start >= len(self.plain):
             return None
@@ -165,7 +165,7 @@ class _Reader:
         return {"thing": things[place - 1 if place > 0 else -1][0]}, end
 
     def _robots(self, at: int) -> tuple[dict[str, Any], int] | None:
-        """Robot 3; robots 3, 4 and 5; r7; the third robot."""
+        """Read named robots: robot 3; robots 3, 4 and 5; r7; the third robot."""
         after = self.plain[at + 1] if at + 1 < len(self.plain) else ""
         place = table_of("ordinals").get(self.plain[at])
         if place is not None and after in word_set("robots"):
@@ -202,7 +202,7 @@ class _Reader:
         return ({"robots": tuple(numbers)}, end) if numbers else None
 
     def _every(self, at: int) -> tuple[dict[str, Any], int] | None:
-        """Every second robot, every third one, the odd ones."""
+        """Read every second robot, every third one, the odd ones."""
         every, rank = self.plain[at] == "every", "".join(self.plain[at + 1 : at + 2])
         step = 2 if not every or rank == "other" else table_of("ordinals").get(rank, 0)
         end = at + 1 + every
@@ -213,7 +213,7 @@ class _Reader:
         return {"robots": tuple(map(int, self.standing.robots[first - 1 :: step]))}, end + 1
 
     def _number(self, k: int) -> int | None:
-        """A number of a robot: plain digits or a small number word, and no unit after it."""
+        """Return a robot's number: digits or a small number word and no unit after it."""
         match = NUMBERED.match(self.text, self.words[k].start)
         point = any(p.start() == self.words[k].start for p in self.points)
         if match and not (point and self.plain[k - 1] in ("to", "at", "(", "point")):
@@ -226,7 +226,7 @@ class _Reader:
         return match.end() if match else self.words[k].end
 
     def _amount(self, at: int) -> tuple[dict[str, Any], int] | None:
-        """A number, a length, an angle or a share."""
+        """Read a number, a length, an angle or a share."""
         amount = next((q for q in self.amounts if q.start <= self.words[at].start < q.end), None)
         if amount is None or amount.start != self.words[at].start or amount.least != amount.most:
             return None
@@ -241,7 +241,7 @@ class _Reader:
         return {"num": amount.least}, end
 
     def _thing(self, at: int) -> tuple[dict[str, Any], int] | None:
-        """A phrase for a thing, such as "the left tree" or "the big oak"."""
+        """Read a phrase for a thing, such as "the left tree" or "the big oak"."""
         start = at + (self.plain[at] in (*ARTICLES, "this", "that", "other"))
         if start == at and not self._may_open(at):
             return self._colour(at)
@@ -254,7 +254,7 @@ class _Reader:
         description = Description(self.plain, start)
         end = description.at
         led = at > 0 and self.plain[at - 1] in (*word_set("before_things"), *ARTICLES)
-        strange = any(map(_tells_otherwise, self.plain[start:end]))
+        strange = any(map(_has_other_meaning, self.plain[start:end]))
         if description.thing.noun and not description.thing.plural and not strange:
             heads = [w for w in self.plain[start:end] if w in word_set("formation_nouns")]
             if heads and not (at > 0 and self.plain[at - 1] in word_set("before_things")):
@@ -271,14 +271,14 @@ class _Reader:
         return None
 
     def _colour(self, at: int) -> tuple[dict[str, Any], int] | None:
-        """The colour of a known thing in its place: "brown gets none"."""
+        """Read a colour that stands for a known thing: "brown gets none"."""
         found = thing_phrase(self.plain, at)
         labels = {w for _, label in self.standing.things for w in label.lower().split()}
         colour = found is not None and found.kind == "colours" and self.plain[at] in labels
         return ({"thing": self.plain[at]}, at + 1) if colour else None
 
     def _may_open(self, at: int) -> bool:
-        """Whether a phrase for a thing may begin here without an article: "left tree"."""
+        """Return whether a phrase for a thing may begin here without an article: "left tree"."""
         if at > 0 and self.plain[at - 1] in word_set("before_things"):
             return True
         found = thing_phrase(self.plain, at)
@@ -289,7 +289,7 @@ class _Reader:
         )
 
     def _stranger(self, start: int, other: bool) -> tuple[dict[str, Any], int] | None:
-        """A noun of no list after an article or preposition, with adjectives before it."""
+        """Read an unlisted noun after an article or preposition, with adjectives before it."""
         end = start
         while end < len(self.words) and end - start < 3:
             word = self.plain[end]
@@ -311,15 +311,15 @@ class _Reader:
 
 
 def _is_headed(words: Sequence[str]) -> bool:
-    """Whether a noun for a thing is among the words."""
+    """Return whether a noun for a thing is among the words."""
     return any(
         (found := thing_phrase(words, k)) is not None and found.kind in HEADS
         for k in range(len(words))
     )
 
 
-def _tells_otherwise(word: str) -> bool:
-    """Whether a word says something else here than where or which a thing is."""
+def _has_other_meaning(word: str) -> bool:
+    """Return whether a word says something other than which thing it is, or where."""
     if thing_phrase([word], 0) or word in table()["determiners"]:
         return word in PRONOUNS
     kinds = set(lexicon().get((word,), {"filler": ""}))
@@ -329,25 +329,25 @@ def _tells_otherwise(word: str) -> bool:
 
 @cache
 def rules() -> dict[str, Any]:
-    """followups.yaml."""
+    """Return the content of followups.yaml, every value as text."""
     text = resources.files(__package__ or "").joinpath("followups.yaml").read_text("utf-8")
     return yaml.load(text, yaml.BaseLoader)
 
 
 def table_of(name: str) -> dict[str, int]:
-    """A table of whole numbers by word."""
+    """Return a table of followups.yaml of whole numbers by word."""
     return {word: int(number) for word, number in rules()[name].items()}
 
 
 @cache
 def word_set(name: str) -> frozenset[str]:
-    """A list of words of followups.yaml."""
+    """Return a list of words of followups.yaml."""
     return frozenset(rules()[name])
 
 
 @cache
 def lexicon() -> dict[tuple[str, ...], dict[str, Any]]:
-    """Every phrase, without its articles, with its kinds and what it says in each."""
+    """Return every phrase, without its articles, with its kinds and its value for each."""
     found: dict[tuple[str, ...], dict[str, Any]] = {}
     rows = [
         (kind, value, phrases)
@@ -375,11 +375,11 @@ def lexicon() -> dict[tuple[str, ...], dict[str, Any]]:
 
 @cache
 def longest() -> int:
-    """Words of the longest phrase, with room for articles."""
+    """Return the number of words of the longest phrase, with room for articles."""
     return max(map(len, lexicon())) + 2
 
 
 @cache
 def known_words() -> frozenset[str]:
-    """Every word that is part of a phrase, or of a number."""
+    """Return every word that is part of a phrase, or of a number."""
     return frozenset(w for words in lexicon() for w in words) | {*SMALL, *word_set("robots")}

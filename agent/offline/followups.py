@@ -1,7 +1,7 @@
-"""What is said to a plan that stands, to edits of it, an answer, or a question.
+"""Reader of words about an existing plan into edits of it, an answer, or a question.
 
-Where no frame of followups.yaml takes every phrase, it may be a whole new instruction; else it is
-asked about, quoting what was not understood. Nothing said is left out.
+Where no frame of followups.yaml takes every phrase, it may be a whole new instruction; else the
+person is asked, quoting what was not understood. No words are left out.
 """
 
 import re
@@ -30,23 +30,23 @@ WITHOUT_PLAN = (
     *(*TALK, "go", "hold", "undo", "redo", "first", "restart"),
     *("refuse_checks", "refuse_through"),
 )
-"""Frames that fit when no plan stands."""
+"""Frames that fit when there is no plan."""
 INSTRUCTING = (
     *("arrange", "arranged", "target", "close", "cage", "count", "split", "sides", "gap"),
     *("distance", "shift"),
 )
-"""Frames of what is an instruction when no plan stands."""
+"""Frames whose words are an instruction when there is no plan."""
 REMEDIES = ("out", "in", "distance", "scale", "spacing", "count", "add", "remove")
-"""Kinds of edits that say what is to be done about "too close"."""
+"""Kinds of edits that can be the remedy for "too close"."""
 KEEPS = re.compile(
     r"\bkeep\w* (?:(?:the|this|that|their|same) )*(?P<what>distance|number)\b", re.IGNORECASE
 )
 KEPT = {"distance": {"out", "in", "distance", "scale"}, "number": {"count", "add", "remove"}}
-"""What may not be changed where it is to be kept, by the kinds of edits that change it."""
+"""What is to be kept, and the kinds of edits that would change it."""
 ASKING = ("how", "what", "where", "who", "why")
-"""Words that no answer begins with."""
+"""Question words, with which no answer begins."""
 ADDING = ("more", "less", "again", "toofar", "otherway", "corrected")
-"""Frames that build on the last change also after "no"."""
+"""Frames that build on the last change even after "no"."""
 PLAIN = (
     "What should change? For example: a bit further out, turn it 30 degrees, two more robots, or "
     "undo."
@@ -62,7 +62,7 @@ SEQUENCE = re.compile(
     r"(?<=[a-z0-9.)])\b[ ,:.]*(?P<rest>.+)$",
     re.IGNORECASE,
 )
-"""One thing now, the other once it is confirmed."""
+"""Two steps: one to take now, the other once it is confirmed."""
 ASIDE = re.compile(
     r"^\W*(?:(?:no|now|ok|okay|and|then|hm+|rather|actually|please)\b[ ,.]*)+"
     r"|[ ,]+(?:instead|rather|now|please)(?=[.!?]*$)",
@@ -72,32 +72,32 @@ DEFAULTS = (("spacing", "even"), ("fit", "normal"))
 
 
 def read_followup(words: str, standing: Standing | None) -> Followup:
-    """What is meant by words that are said when a plan stands, or talk that fits at any time."""
+    """Return what is meant by words about a plan; without a plan, talk or an instruction."""
     if standing is None:
-        return _heard(words, standing)
+        return _read_numbered(words, standing)
     words = with_numbers(words, standing)
     if not standing.places:
-        read = partial(_heard, standing=standing)
+        read = partial(_read_numbered, standing=standing)
         return all_or_those(words, read(words), standing, read)
     told = numbered(standing)
-    robots = meant_by_place(words, told, lambda text: _is_settled(_heard(text, told)))
+    robots = meant_by_place(words, told, lambda text: _is_settled(_read_numbered(text, told)))
     if robots.tied:
         return Followup("ask", text=robots.question, options=robots.options, about="tied")
-    meant = _heard(robots.words, told)
+    meant = _read_numbered(robots.words, told)
     moved = meant.rest or (len(meant.edits) > 1 and any("robot" not in e for e in meant.edits))
     if moved and words != robots.words:
         text = f'Which robot is meant in "{words}" may change on the way. Say it in two turns.'
         return Followup("ask", text=text, about="tied")
-    return all_or_those(words, meant, standing, partial(_heard, standing=told))
+    return all_or_those(words, meant, standing, partial(_read_numbered, standing=told))
 
 
 def _is_settled(followup: Followup) -> bool:
-    """Whether it is understood, and about nothing that has to be found."""
+    """Return whether it is understood, and names nothing that has to be found."""
     return followup.kind not in ("ask", "refuse", "instruction") and not followup.things
 
 
-def _heard(words: str, standing: Standing | None) -> Followup:
-    """What is meant by words in which robots have their numbers."""
+def _read_numbered(words: str, standing: Standing | None) -> Followup:
+    """Return what is meant by words in which robots have their numbers."""
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
     meant = _read(words, standing)
@@ -113,7 +113,7 @@ def _heard(words: str, standing: Standing | None) -> Followup:
 
 
 def _read(words: str, standing: Standing | None) -> Followup:
-    """What is meant by all of the words."""
+    """Return what is meant by all of the words, asides included."""
     sequence = SEQUENCE.match(spelled(words)) if standing else None
     if sequence:
         now = read_followup(sequence["now"] or sequence["lead"], standing)
@@ -126,18 +126,18 @@ def _read(words: str, standing: Standing | None) -> Followup:
         return Followup("refuse", text=refused)
     greets = "hello" in line.led or "thanks" in line.led
     if all(is_empty(c) or (greets and set(c.kinds) <= SLIGHT) for c in line.chunks):
-        return _said_nothing(line, there=standing is not None)
-    afresh = _afresh(line)
+        return _without_content(line, there=standing is not None)
+    afresh = _new_instruction(line)
     if afresh:
         return Followup("instruction", text=afresh)
     clauses = line.read()
     if standing is None:
         return _without_plan(line, clauses)
-    return _not_framed(line) if clauses is None else _gathered(line, clauses)
+    return _not_framed(line) if clauses is None else _combined_followup(line, clauses)
 
 
 def commands(words: str, standing: Standing) -> bool:
-    """Whether words are a command or question, not only what another one leaves open."""
+    """Return whether words are a command or question of their own, not just an answer."""
     lead = next(iter(re.findall(r"[a-z']+", words.lower())), "")
     if lead in ASKING or (lead in word_set("questions") and words.rstrip().endswith("?")):
         return True
@@ -147,19 +147,19 @@ def commands(words: str, standing: Standing) -> bool:
     return any(verbs) and understood
 
 
-def _afresh(line: Line) -> str:
-    """The instruction after "start over", if there is one."""
+def _new_instruction(line: Line) -> str:
+    """Return the instruction after "start over", "" if there is none."""
     if not line.chunks or "restart" not in line.chunks[0].kinds:
         return ""
     left = [c for c in line.chunks[1:] if not is_empty(c)]
     return line.words[left[0].start :] if len(left) > 1 else ""
 
 
-def _said_nothing(line: Line, *, there: bool) -> Followup:
-    """Talk, or yes and no to nothing that was asked."""
+def _without_content(line: Line, *, there: bool) -> Followup:
+    """Return the follow-up of words without content: talk, or a yes or no to no question."""
     if line.denies:
         options = ("undo", "a bit further out", "a bit closer")
-        return _questioned(line, "What should be different? Nothing was asked.", options)
+        return _as_question(line, "What should be different? Nothing was asked.", options)
     if "thanks" in line.led and "ok " not in line.led:
         return Followup("talk", about="thanks")
     if "hello" in line.led:
@@ -171,29 +171,29 @@ def _said_nothing(line: Line, *, there: bool) -> Followup:
 
 
 def _without_plan(line: Line, clauses: Sequence[Clause] | None) -> Followup:
-    """What is said when no plan stands."""
+    """Return the follow-up of words when there is no plan."""
     if clauses is None or all(c.frame in INSTRUCTING for c in clauses):
         return Followup("instruction", text=line.words)
     if all(c.frame in WITHOUT_PLAN for c in clauses):
-        return _gathered(line, clauses)
+        return _combined_followup(line, clauses)
     return Followup("refuse", text=NO_PLAN)
 
 
-def _questioned(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
-    """A question with its options; undo is one only where something was changed."""
+def _as_question(line: Line, question: str, options: tuple[str, ...] = ()) -> Followup:
+    """Return a question with its options; undo is one only where something was changed."""
     offered = tuple(o for o in options if line.standing.edits or o != "undo")
     return Followup("ask", text=question, options=offered)
 
 
-def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
-    """All that the clauses come to."""
+def _combined_followup(line: Line, clauses: Sequence[Clause]) -> Followup:
+    """Return the follow-up that all clauses together amount to."""
     same = [c for c in clauses if c.frame == "again" and "same" in line.words_of(c.chunks).lower()]
     kept = [c for c in clauses if c not in same] or clauses  # "same again, closer"
     kept = _without_moot(line, kept)
     complaints = [c for c in kept if c.frame == "toofar"]
     remedies = [c for c in kept if c not in complaints and _edits(c)]
-    if complaints and remedies:  # how it should be is said beside what is wrong
-        plain = _gathered(line, [c for c in kept if c not in complaints])
+    if complaints and remedies:  # the remedy says what to do about the complaint
+        plain = _combined_followup(line, [c for c in kept if c not in complaints])
         told = (*plain.background, *(line.words_of(c.chunks) for c in complaints))
         return replace(plain, background=told)
     effects = [e for c in kept for e in c.effects]
@@ -202,13 +202,13 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
         return Followup("ask", text=unsettled["question"], options=unsettled["options"])
     if unsettled is not None:
         return Followup("refuse", text=unsettled["text"])
-    edits = _once([e for e in effects if e["kind"] not in NO_EDITS])
+    edits = _without_cancelling([e for e in effects if e["kind"] not in NO_EDITS])
     fresh = all(c.frame != "corrected" for c in kept)
     question = _contradiction(line, edits) if fresh else None
     if question is not None:
         return question
     undo = sum(e.get("steps", 0) for e in effects if e["kind"] == "undo")
-    # a spacing that is kept is that of before, and a ring holds with as many as there are then
+    # first keep the old spacing; last close the ring, with the final number of robots
     edits.sort(key=lambda e: (e.get("factor") != 1, e["kind"] == "escape-proof"))
     added = line.adds or clauses[0].frame in ADDING
     if "no " in line.led and edits and not undo and not added:
@@ -224,18 +224,18 @@ def _gathered(line: Line, clauses: Sequence[Clause]) -> Followup:
 
 
 def _edits(clause: Clause) -> bool:
-    """Whether a clause changes something."""
+    """Return whether a clause changes something."""
     return any(e["kind"] not in (*NO_EDITS, "ask", "refuse", "undo") for e in clause.effects)
 
 
-def _once(edits: list[Effect]) -> list[Effect]:
-    """The edits, where what would undo itself is said twice once: "flip it, mirror it"."""
+def _without_cancelling(edits: list[Effect]) -> list[Effect]:
+    """Return the edits without repeats that would cancel out: "flip it, mirror it"."""
     twice = [k for k in range(1, len(edits)) if edits[k] == edits[k - 1]]
     return [e for k, e in enumerate(edits) if k not in twice or e["kind"] not in ("mirror", "swap")]
 
 
 def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
-    """The clauses without what others make moot: "too much, go back", "never mind, closer"."""
+    """Return the clauses that no others make moot: "too much, go back", "never mind, closer"."""
     undone = any(c.frame in ("undo", "first") for c in clauses)
     kept = [c for c in clauses if not (undone and c.frame in ADDING)]
     waving = {"mind", "forget"}
@@ -251,7 +251,7 @@ def _without_moot(line: Line, clauses: Sequence[Clause]) -> Sequence[Clause]:
 
 
 def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
-    """The question to ask where edits contradict each other."""
+    """Return the question to ask where edits contradict each other, else None."""
     alone = [
         e["kind"]
         for e in edits
@@ -260,28 +260,28 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
     kept = KEEPS.search(line.words)
     if kept and {*alone} & KEPT[kept["what"].lower()]:
         question = f'"{line.words}" both changes and keeps the {kept["what"]}. Which?'
-        return _questioned(line, question)
+        return _as_question(line, question)
     if {"out", "in"} <= {*alone}:
         says = "says both further out and closer. Which?"
-        return _questioned(line, f'"{line.words}" {says}', ("further out", "closer"))
+        return _as_question(line, f'"{line.words}" {says}', ("further out", "closer"))
     stated = [k for k in ("distance", "count", "sides", "side") if alone.count(k) > 1]
     if stated:
-        return _questioned(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
+        return _as_question(line, f'"{line.words}" says two things of the {stated[0]}. Which one?')
     parted = [
         e["to"] for e in edits if e["kind"] == "target" and e.get("robots") and "group" not in e
     ]
     if len(set(parted)) < len(parted):
-        return _questioned(line, f'"{line.words}": which robots are to go, and where? Name them.')
+        return _as_question(line, f'"{line.words}": which robots are to go, and where? Name them.')
     if alone.count("target") > 1:
-        return _questioned(line, f'"{line.words}" names several things. Around which one?')
+        return _as_question(line, f'"{line.words}" names several things. Around which one?')
     return None
 
 
 def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: int) -> Followup:
-    """The follow-up of effects that neither ask nor refuse."""
+    """Return the follow-up of effects that neither ask nor refuse."""
     kinds = [e["kind"] for e in effects]
     stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*line.excepted]
-    moved = {e.get(name) for e in line.standing.edits for name in _called_in(e)}
+    moved = {e.get(name) for e in line.standing.edits for name in _robot_fields(e)}
     swapped = [e["kind"] for e in line.standing.edits] == ["swap"] and moved & {*stays}
     unchanged = not moved or line.standing.said not in ("", line.standing.words)
     if stays and not edits and unchanged and line.denies:
@@ -290,17 +290,17 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         return Followup("undo", undo=1)
     if stays and not edits:
         if not line.standing.edits:
-            return _questioned(line, f"Robot {listed(stays)} stays. What should the others do?")
+            return _as_question(line, f"Robot {listed(stays)} stays. What should the others do?")
         undo, edits = 1, [dict(e) for e in line.standing.edits]
     if "rest" in kinds:
         moved = ("out", "in", "rotate", "shift", "scale", "spacing")
         if not edits or any(e["kind"] in moved for e in edits):
             which = "which robots are to move, and which stay? Name them by number."
-            return _questioned(line, f'"{line.words}": {which}')
+            return _as_question(line, f'"{line.words}": {which}')
         edits = [e | {"stay": True} if e["kind"] == "target" else e for e in edits]
-    queries = _once([e for e in effects if e["kind"] == "query"])
+    queries = _without_cancelling([e for e in effects if e["kind"] == "query"])
     if len(queries) > 1 or (queries and edits):
-        return _questioned(line, f'"{line.words}" says more than one thing. Which comes first?')
+        return _as_question(line, f'"{line.words}" says more than one thing. Which comes first?')
     query = next(iter(queries), None)
     to = next((e["to"] for e in effects if e["kind"] == "undo" and "to" in e), "")
     others: tuple[Kind, ...] = ("go", "hold", "query")
@@ -311,26 +311,26 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         to=to,
         edits=tuple(edits),
         stay=tuple(stays),
-        go="go" in kinds and not edits,  # what is new is looked at first
+        go="go" in kinds and not edits,  # the person looks at a new plan first
         hold="hold" in kinds,
         query=query and {k: v for k, v in query.items() if k != "kind"},
         about=_about([e["about"] for e in effects if e["kind"] == "talk"]),
     )
 
 
-def _called_in(edit: Mapping[str, Any]) -> tuple[str, ...]:
-    """The fields of an edit in which single robots are named."""
+def _robot_fields(edit: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the fields of an edit in which single robots are named."""
     return ("a", "b") if edit["kind"] == "swap" else ("robot",)
 
 
 def _about(talk: Sequence[str]) -> str:
-    """What is talked about above all: thanks and greetings come last."""
+    """Return the main topic of talk: thanks and greetings come last."""
     weighty = (about for about in talk if about not in ("thanks", "hello"))
     return next(weighty, talk[0] if talk else "")
 
 
 def _not_framed(line: Line) -> Followup:
-    """A whole new instruction, a form that the instruction reader knows, or a question."""
+    """Return a whole new instruction, a form that the instruction reader knows, or a question."""
     text = ASIDE.sub("", line.words)
     reading = read_instruction(text, line.standing.metres_per_pixel)
     left = (reading.stops, reading.unread, reading.language, reading.unscaled, reading.background)
@@ -355,14 +355,14 @@ def _not_framed(line: Line) -> Followup:
     demands["shape"]["where"] = demands["shape"]["where"] or line.standing.beside
     if demands["shape"]["where"] is None:
         options = tuple(f"{text} on the {side}" for side in ("left", "right"))
-        return _questioned(line, f'Where by it, in "{text}"?', options)
+        return _as_question(line, f'Where by it, in "{text}"?', options)
     edits: list[Effect] = [{"kind": "arrange", "demands": demands}]
     edits += [{"kind": "count", "robots": reading.robots}] if reading.robots else []
     return Followup("edits", edits=tuple(edits))
 
 
 def _not_understood(line: Line) -> Followup:
-    """A question that says what is clear, and quotes what is not."""
+    """Return a question that says what is clear, and quotes what is not."""
     parts = _parts(line.chunks)
     read = [p for p in parts if _is_clear(line, p)]
     unclear = [p for p in parts if p not in read]
@@ -372,12 +372,12 @@ def _not_understood(line: Line) -> Followup:
     quoted = " and ".join(f'"{q}"' for q in dict.fromkeys(quotes or [line.words]))
     if not clear:
         options = ("undo", "a bit further out", "turn it 30 degrees")
-        return _questioned(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
+        return _as_question(line, f"I do not know what to do with {quoted}. {PLAIN}", options)
     words = [[line.words[c.start : c.end] for c in part] for part in clear]
     understood = ", ".join(" ".join(w for w in part if w not in ",.;!?") for part in words)
     advice = "Say it another way, or leave it out."
     question = f'"{understood}" is clear; I do not know what to do with {quoted}. {advice}'
-    return _questioned(line, question, (understood,))
+    return _as_question(line, question, (understood,))
 
 
 def _is_clear(line: Line, chunks: Sequence[Chunk]) -> bool:
@@ -386,7 +386,7 @@ def _is_clear(line: Line, chunks: Sequence[Chunk]) -> bool:
 
 
 def _parts(chunks: Sequence[Chunk]) -> list[list[Chunk]]:
-    """The phrases between separators."""
+    """Return the phrases between separators."""
     found: list[list[Chunk]] = [[]]
     for chunk in chunks:
         if "sep" in chunk.kinds:

@@ -1,7 +1,7 @@
 """Runs of small words that say one thing: "not lined up with the others", "in the upper left".
 
-People say these in too many ways to list. A run is read as a whole: which kinds of words are in
-it decides what it says, and words that are in none of the lists end it.
+People phrase these in too many ways to list. A run is read as a whole: the kinds of words in it
+decide what it says, and a word that is in none of the lists ends it.
 """
 
 from functools import cache
@@ -18,7 +18,7 @@ MIDDLE_OF_PICTURE = {
 
 
 def difference(words: Words, at: int) -> tuple[str, int] | None:
-    """The kind of oddness that a run of words speaks of, a pick, and the run's length."""
+    """Return the difference that a run of words describes, as a pick, and its length in words."""
     end = _run_end(words, at, _difference_words())
     while end > at:
         pick = _spoken_difference(set(words[at:end]), words[end - 1])
@@ -29,7 +29,7 @@ def difference(words: Words, at: int) -> tuple[str, int] | None:
 
 
 def position(words: Words, at: int) -> tuple[str, int] | None:
-    """The place in the picture that a run of words speaks of, a pick, and the run's length."""
+    """Return the place in the picture that a run describes, as a pick, and its length in words."""
     end = _run_end(words, at, _position_words())
     lists = table()["positions"]
     while end > at:
@@ -47,7 +47,7 @@ def position(words: Words, at: int) -> tuple[str, int] | None:
 
 
 def comparison(words: Words, at: int) -> int:
-    """How many words compare with all the others: "than any of the other boats"."""
+    """Return how many words compare with all the others: "than any of the other boats"."""
     if words[at] not in ("than", "compared"):
         return 0
     end = at + 1
@@ -69,7 +69,7 @@ def _run_end(words: Words, at: int, known: frozenset[str]) -> int:
 
 
 def _spoken_difference(here: set[str], last: str) -> str | None:
-    """What a set of words says, if they say a difference."""
+    """Return the pick for a set of words, or None if they describe no difference."""
     lists = {name: set(words) for name, words in table()["differences"].items()}
     if last in lists["open"]:
         return None
@@ -88,7 +88,7 @@ def _spoken_difference(here: set[str], last: str) -> str | None:
 
 
 def _also_beside(words: Words, at: int, end: int) -> bool:
-    """Whether a side of the thing is more likely meant than one of the picture."""
+    """Return whether a side of the thing is more likely meant than one of the picture."""
     lined = table()["positions"]["lined"]
     return bool({"side", "edge"} & set(words[at:end])) and bool(set(lined) & set(words[:at]))
 

@@ -1,4 +1,4 @@
-"""Which language an instruction is in that the offline planner does not read, to name it."""
+"""Recognises languages that the offline planner does not read, so that it can name them."""
 
 import unicodedata
 from collections.abc import Sequence
@@ -22,13 +22,13 @@ SCRIPTS = {
     "DEVANAGARI": "Hindi",
     "THAI": "Thai",
 }
-"""First words of the Unicode names of letters, and what is written with them."""
+"""First word of a letter's Unicode name, and the language written with it."""
 LEAST_WORDS = 2
-"""So many words of a language tell it, where no more are English."""
+"""Least number of words that identify a language; they also have to outnumber the English."""
 
 
 def foreign_language(words: Sequence[str]) -> str | None:
-    """The language of an instruction that is not in English; None where it may be.
+    """Return the language of an instruction that is not in English; None where it may be English.
 
     Args:
         words: of the instruction, lower case.

@@ -1,4 +1,4 @@
-"""Which words go with which arrangement: by the thesaurus, and by commands it was trained on."""
+"""Which words go with which arrangement, by the thesaurus and by the training commands."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -20,17 +20,17 @@ CLASSES_OF = {
 DEMANDING = frozenset(
     {"gap", "face", "avoid", "wait", "motion", "each", "rest", "far", "near", "side", "figure"}
 )
-"""Classes whose words say more than an arrangement: a rule takes them, or they are asked."""
+"""Classes whose words say more than an arrangement: a rule takes them, or the person is asked."""
 NEUTRAL = ("place", "robot")
-"""Classes of classes.yaml whose words say an arrangement, or none."""
+"""Classes of classes.yaml whose words go with any arrangement."""
 WEIGHTY = word_list("weighty")
-"""Small words that change who, how many or whether: a rule takes them, or they are asked."""
+"""Small words on who, how many or whether: a rule takes them, or the person is asked."""
 NEGATIONS = word_list("negations")
-"""What a closed ring is to prevent is said with these."""
+"""Words that say what must not happen, such as what a closed ring is to prevent."""
 
 
 def weighs(word: str, classes: frozenset[str], relation: str) -> bool:
-    """Whether a word changes more than the arrangement says: "every", but of no cage "nobody"."""
+    """Return whether a word says more than the arrangement: "every", but not a cage's "nobody"."""
     if word not in WEIGHTY:
         return False
     says_it = (relation == "cage" and word in NEGATIONS) or (
@@ -40,7 +40,7 @@ def weighs(word: str, classes: frozenset[str], relation: str) -> bool:
 
 
 def may_command(words: Sequence[str], relation: str) -> list[bool]:
-    """For each word whether it can be part of a command for an arrangement."""
+    """Return for each word whether it can be part of a command for an arrangement."""
     return [
         not word[0].isalpha()
         or word in fillers()
@@ -52,7 +52,7 @@ def may_command(words: Sequence[str], relation: str) -> list[bool]:
 
 
 def goes_with(word: str, classes: frozenset[str], relation: str) -> bool:
-    """Whether a word goes with an arrangement: by the thesaurus or in other commands."""
+    """Return whether a word goes with an arrangement, by the thesaurus or the training commands."""
     if classes & {*CLASSES_OF.get(relation, ()), *NEUTRAL}:
         return True
     meanings = in_use().words.get(stem(word), frozenset())
@@ -64,6 +64,6 @@ def goes_with(word: str, classes: frozenset[str], relation: str) -> bool:
 
 @cache
 def fillers() -> frozenset[str]:
-    """Function words that say nothing of an arrangement, fillers.txt."""
+    """Return the function words of fillers.txt, which say nothing about an arrangement."""
     text = resources.files(__package__ or "").joinpath("fillers.txt").read_text("utf-8")
     return frozenset(text.split())

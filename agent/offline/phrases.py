@@ -1,4 +1,4 @@
-"""The words of things.yaml, and where their phrases stand in a sentence."""
+"""The words of things.yaml, and the phrases of theirs that occur in a sentence."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,7 +16,10 @@ STOPS = ",.;:!?"
 
 @dataclass(frozen=True)
 class Phrase:
-    """A phrase that stands somewhere: what it adds, how long it is, how its last word ends."""
+    """A phrase of things.yaml: its kind and value, its length in words, and its last word's ending.
+
+    It is `plural`, or a possessive that `owns` what follows: "the boat's".
+    """
 
     kind: str
     value: str
@@ -27,13 +30,13 @@ class Phrase:
 
 @cache
 def table() -> dict[str, Any]:
-    """things.yaml, every value as text: YAML would make truth values of "on" and "no"."""
+    """Return things.yaml with every value as text: YAML would read "on" and "no" as booleans."""
     text = resources.files(__package__ or "").joinpath("things.yaml").read_text("utf-8")
     return yaml.load(text, yaml.BaseLoader)
 
 
 def several(words: Words, at: int) -> bool:
-    """Whether it goes on with "of the two", "among these crates": a choice among things."""
+    """Return whether a choice among things follows: "of the two", "among these crates"."""
     opening = phrase(words, at)
     if opening is None or opening.kind != "partitive":
         return False
@@ -48,7 +51,7 @@ def several(words: Words, at: int) -> bool:
 
 
 def phrase(words: Words, at: int) -> Phrase | None:
-    """The longest phrase that stands at a place."""
+    """Return the longest phrase that begins at a word; None if there is none."""
     for length in range(min(_longest_phrase(), len(words) - at), 0, -1):
         *first, last = words[at : at + length]
         owns = last.endswith("'s")
@@ -68,7 +71,7 @@ def phrase(words: Words, at: int) -> Phrase | None:
 
 @cache
 def _phrases() -> dict[tuple[str, ...], tuple[str, str]]:
-    """Every phrase of the tables, with its kind and value."""
+    """Return every phrase of the tables, with its kind and value."""
     words = table()
     found: dict[tuple[str, ...], tuple[str, str]] = {}
     for kind in ("relations", "picks", "traits", "shades", "colours", "shapes"):
@@ -88,7 +91,7 @@ def _longest_phrase() -> int:
 
 
 def _endings(word: str) -> list[tuple[str, bool]]:
-    """The word, and what it may be the plural of."""
+    """Return the word and the words that it may be the plural of; true for the latter."""
     found = [(word, False)]
     if word.endswith("ies"):
         found.append((word[:-3] + "y", True))

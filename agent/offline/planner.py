@@ -1,7 +1,7 @@
-"""The offline planner: rules in a model's place, so that everything runs with no key and no GPU.
+"""The offline planner: rules instead of a model, so that everything runs with no key and no GPU.
 
-It reads the arrangement and the thing meant from phrase tables, has tools measure them, and
-asks when the words do not settle what to do. It is no language model: it sees measures only.
+It reads the arrangement and the thing meant by phrase tables, has tools measure them, and asks
+when the words do not settle what to do. It is not a language model and sees only measures.
 """
 
 import json
@@ -39,7 +39,7 @@ ONE_AT_A_TIME = (
 )
 USUAL_CORNERS = 4
 READING = "The rules account for every word; the rest of them says which thing is meant."
-"""Answers a doubt, which comes of single words."""
+"""Answer to a doubt about the reading, which arises from single words."""
 
 
 class OfflinePlanner:
@@ -49,7 +49,7 @@ class OfflinePlanner:
     reads_all = True
 
     async def reply(self, request: Request) -> Reply:
-        """The next step for a conversation that began with a task message."""
+        """Return the next step of a conversation that began with a task message."""
         turn = tuple(turn_of(request.messages))
         reply = _next_step(turn, request.messages[: -len(turn)])
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
@@ -58,7 +58,7 @@ class OfflinePlanner:
 
 
 def _next_step(turn: History, before: History) -> Reply:
-    """What to do next in a turn, which began with a task message, after those before."""
+    """Return the next step of a turn that began with a task message; `before` are earlier ones."""
     first = turn[0]
     assert isinstance(first, User)
     agreed = _without_agreed(turn)
@@ -66,9 +66,9 @@ def _next_step(turn: History, before: History) -> Reply:
 
 
 def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
-    """What to do next for one instruction, which may come later in a sequence of them."""
-    if isinstance(turn[-1], Result) and _asks_of_outline(turn[:-1]):
-        return _of_outline(turn[-1])
+    """Return the next step for one instruction, which may be a later one of a sequence."""
+    if isinstance(turn[-1], Result) and _ends_in_outline_question(turn[:-1]):
+        return _after_outline_answer(turn[-1])
     placed = with_places(task, turn)
     if isinstance(placed, Reply):
         return placed
@@ -82,24 +82,24 @@ def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
     if isinstance(last, Result) and last.name == "deploy":
         return Reply(text=_after_deploy(task, last, turn))
     if isinstance(last, Result) and last.error:
-        return Reply(text=_left_off(last, turn))
+        return Reply(text=_failure_text(last, turn))
     return _begin(task, turn, before)
 
 
 def _without_agreed(turn: History) -> History:
-    """A turn without the calls that an outline was doubted in, where a person has agreed to it."""
+    """Return the turn without calls that doubted an outline to which the person then agreed."""
     kept: list[Message] = []
     for message in turn:
         agreed = isinstance(message, Result) and says_yes(message.text)
-        if agreed and _asks_of_outline(kept):
+        if agreed and _ends_in_outline_question(kept):
             del kept[-3:]
         else:
             kept.append(message)
     return tuple(kept)
 
 
-def _of_outline(answer: Message) -> Reply:
-    """What an answer to the question about a doubtful outline comes to that is no yes."""
+def _after_outline_answer(answer: Message) -> Reply:
+    """Return the reply to an answer other than yes about a doubtful outline."""
     reason = "Nothing was placed, as you said no."
     if not declines(answer.text):
         said = f'"{answer.text.strip()}" does not say whether the outline shown is right'
@@ -107,16 +107,16 @@ def _of_outline(answer: Message) -> Reply:
     return _call("report_impossible", {"reason": reason})
 
 
-def _asks_of_outline(messages: Sequence[Message]) -> bool:
-    """Whether they end in a question about an outline whose confidence was too low."""
+def _ends_in_outline_question(messages: Sequence[Message]) -> bool:
+    """Return whether messages end in a question about an outline of too low confidence."""
     refused, asked = (None, None, *messages)[-2:]
     doubted = isinstance(refused, Result) and refused.cause == "low_confidence"
     return doubted and isinstance(asked, Reply) and [c.name for c in asked.calls] == ["ask_user"]
 
 
 def _begin(task: Task, history: History, before: History) -> Reply:
-    """Propose a formation, or find and ask what is missing."""
-    still_open, chosen = _stated(task, history).open, _narrowed(task, history)
+    """Propose a formation, or look for a thing or ask for what is missing."""
+    still_open, chosen = _restated_instruction(task, history).open, _narrowed(task, history)
     if isinstance(chosen, Reply):
         return chosen
     shown, task = task.pointed, chosen
@@ -146,7 +146,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if found:
         looked_for = prompts_of([(f.candidate, _label(f.wording)) for f in found], before, ids)
         prompts = [*prompts, *looked_for]
-        ids, others = _parted([*ids, *(p["id"] for p in looked_for)], len(named))
+        ids, others = _split_last([*ids, *(p["id"] for p in looked_for)], len(named))
     contract = _in_unit(task, contract_of(reading, robots, ids, others, _refusals(history)))
     if _was_doubted(history):
         contract["reading"] = READING
@@ -156,7 +156,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
 def _found(
     task: Task, reading: Reading, named: list[str], history: History, *, pointed: bool
 ) -> list[Found] | Step:
-    """The things that words are for, those that are only named last, or what to do first."""
+    """Return the things meant, then those in `named`, or the call that has to come first."""
     found = [] if pointed else find(_things(task, reading), things_needed(reading), history)
     if isinstance(found, Step):
         return found
@@ -172,11 +172,11 @@ def _found(
 
 
 def _narrowed(task: Task, history: History) -> Task | Reply:
-    """The task about what its words choose of what is pointed at, or what comes before that."""
+    """Return the task about the pointed things that its words choose, or what comes first."""
     agreed = _agreed(task, history)
     if agreed is not None:
         return agreed
-    task, answers = _told_which(task, history)
+    task, answers = _chosen_by_answers(task, history)
     task = replace(task, instruction=restated(task, answers).text)
     several = about_several(task, task.robots or _number_answered(history), history)
     if several is not None:
@@ -187,8 +187,8 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
     return _call(chosen.name, chosen.arguments) if isinstance(chosen, Step) else chosen
 
 
-def _told_which(task: Task, history: History) -> tuple[Task, list[str]]:
-    """The task about what answers have chosen of what is pointed at, and the other answers."""
+def _chosen_by_answers(task: Task, history: History) -> tuple[Task, list[str]]:
+    """Return the task about the pointed things that answers chose, and the other answers."""
     left: list[str] = []
     for question, answer in _answered(history):
         reading = read_instruction(restated(task, left).text, task.metres_per_pixel)
@@ -205,7 +205,7 @@ def _in_unit(task: Task, contract: dict[str, Any]) -> dict[str, Any]:
 
 
 def _agreed(task: Task, history: History) -> Reply | None:
-    """What a plain yes or no to a question about words that were not understood comes to."""
+    """Return the reply to a yes, no or "leave it out" about words not understood, else None."""
     asked = [c for c in calls_in(history) if c.name == "ask_user" and "contract" in c.arguments]
     if not asked:
         return None
@@ -226,17 +226,17 @@ def _agreed(task: Task, history: History) -> Reply | None:
 
 
 def _things(task: Task, reading: Reading) -> tuple[Reference, ...]:
-    """What the instruction refers to; where no phrase stood out, whatever in it refers."""
+    """Return what the phrases for things refer to; if none do, what the whole instruction does."""
     return described(reading.things) or described([task.instruction])
 
 
-def _parted(ids: list[str], last: int) -> tuple[list[str], list[str]]:
-    """All but the last so many ids, and those."""
+def _split_last(ids: list[str], last: int) -> tuple[list[str], list[str]]:
+    """Split ids into all but the last `last`, and those."""
     return ids[: len(ids) - last], ids[len(ids) - last :]
 
 
 def _refusals(history: History) -> int:
-    """How many places beside a thing had no room."""
+    """Return how many places beside a thing had no room."""
     return sum(isinstance(m, Result) and m.cause == "no_room_beside" for m in history)
 
 
@@ -244,20 +244,20 @@ def _was_doubted(history: History) -> bool:
     return any(isinstance(m, Result) and m.cause == "doubt" for m in history)
 
 
-def _left_off(result: Result, history: History) -> str:
-    """What there is to say when a call was refused or took too long: what it was about, and why."""
+def _failure_text(result: Result, history: History) -> str:
+    """Return the text for a call that was refused or took too long: what it was about, and why."""
     meant = next(c.arguments for c in calls_in(history) if c.id == result.call_id)
     wording = meant.get("question") or meant.get("reason") or "The thing meant was not looked for."
     return f"{wording} {result.text}"
 
 
-def _stated(task: Task, history: History) -> Restated:
-    """What the instruction and the answers to questions about it say together."""
-    return restated(*_told_which(task, history))
+def _restated_instruction(task: Task, history: History) -> Restated:
+    """Return what the instruction and the answers to questions about it say together."""
+    return restated(*_chosen_by_answers(task, history))
 
 
 def _answered(history: History) -> list[tuple[str, str]]:
-    """The questions that offered no candidates, each with what the person answered."""
+    """Return the questions that offered no candidates, each with the person's answer."""
     asked = {c.id: c.arguments for c in calls_in(history) if not c.arguments.get("candidates")}
     answers = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
     return [
@@ -268,18 +268,18 @@ def _answered(history: History) -> list[tuple[str, str]]:
 
 
 def _number_answered(history: History) -> int | None:
-    """The number of robots that an answer gives alone."""
+    """Return the number of robots in an answer that is just a number, else None."""
     answers = (answer for _, answer in _answered(history))
     return next((int(t) for t in answers if t.isascii() and t.isdecimal()), None)
 
 
 def _standing_count(task: Task) -> int | None:
-    """How many robots stand in the plan that a later turn begins with."""
+    """Return how many robots the plan has that a later turn begins with; None without a plan."""
     return len(task.standing["robots"]) if task.standing else None
 
 
 def _robot_count(task: Task, reading: Reading, history: History) -> int | None:
-    """How many robots are asked for; None where that has to be asked."""
+    """Return how many robots are wanted; None where the person has to be asked."""
     wording = reading.robots or (reading.form.robots if reading.form else None)
     robots = task.robots or wording or _number_answered(history) or _standing_count(task)
     return robots or (_corner_count(history) if _counts_corners(reading) else None)
@@ -290,7 +290,7 @@ def _counts_corners(reading: Reading) -> bool:
 
 
 def _corner_count(history: History) -> int | None:
-    """As many as the outline of the thing has corners, which is measured by a first proposal."""
+    """Return the corners of the thing's outline, which a first proposal measures; before that 4."""
     measured = [m for m in history if isinstance(m, Result) and m.name == "propose_formation"]
     if not measured or measured[-1].error:
         return USUAL_CORNERS
@@ -299,7 +299,7 @@ def _corner_count(history: History) -> int | None:
 
 
 def _label(wording: str) -> str:
-    """What a thing is called: the words for it without their article."""
+    """Return a thing's label: the words for it without their article."""
     return wording.split(" ", 1)[-1][:MAX_LABEL]
 
 
@@ -332,7 +332,7 @@ def _after_proposal(task: Task, result: Result, history: History, before: Histor
 
 
 def _may_move_on(task: Task, history: History) -> bool:
-    """Whether a form beside a thing, with no room on one side of it, has another to be tried."""
+    """Return whether a form that had no room on one side of a thing has another side to try."""
     reading = read_instruction(task.instruction, task.metres_per_pixel)
     if reading.form is None or "side" in reading.group:
         return False
@@ -340,7 +340,7 @@ def _may_move_on(task: Task, history: History) -> bool:
 
 
 def _impossible(history: History, reason: str, plan_id: str | None) -> Reply:
-    """Give up, in the words of the tool, with the best plan there is."""
+    """Give up with the tool's reason and the best plan there is, if any."""
     arguments = {"reason": reason} | ({"plan_id": plan_id} if plan_id else {})
     return _call("report_impossible", arguments)
 
@@ -358,12 +358,14 @@ def _after_deploy(task: Task, result: Result, history: History) -> str:
 def _planned(task: Task, plan: dict[str, Any], history: History) -> str:
     noun = "robot has a certified place" if plan["robots"] == 1 else "robots have certified places"
     placed = f"{plan['robots']} {noun} (plan {plan['plan_id']})."
-    return " ".join([*_taken(history), placed, *plan["notes"], *_left_aside(task, history)])
+    return " ".join(
+        [*_candidate_notes(history), placed, *plan["notes"], *_reading_notes(task, history)]
+    )
 
 
-def _left_aside(task: Task, history: History) -> list[str]:
-    """The words that only said which thing, those that changed nothing, and those left out."""
-    stated = _stated(task, history)
+def _reading_notes(task: Task, history: History) -> list[str]:
+    """Return sentences on words that only named the thing, changed nothing, or were left out."""
+    stated = _restated_instruction(task, history)
     reading = read_instruction(stated.text, task.metres_per_pixel)
     told = {
         "Read as words for what was pointed at": reading.things if _target_ids(task) else [],
@@ -377,8 +379,8 @@ def _quoted(words: list[str]) -> str:
     return ", ".join(f'"{quote}"' for quote in dict.fromkeys(words))
 
 
-def _taken(history: History) -> list[str]:
-    """Which candidates were taken for the things meant, and why."""
+def _candidate_notes(history: History) -> list[str]:
+    """Return sentences on which candidates were taken for the things meant, and why."""
     last = next(c for c in calls_in(history)[::-1] if c.name == "propose_formation")
     reasons = located_reasons(history)
     return [

@@ -1,4 +1,4 @@
-"""Which of several things that were pointed at an instruction is about: "the upper coin", "t1"."""
+"""Chooses which of several pointed things an instruction is about: "the upper coin", "t1"."""
 
 import json
 import re
@@ -33,34 +33,34 @@ OFF = re.compile(
     r"(?: (?:be|stand|go))? (?:on|over|near))(?: the)?\s+$",
     re.IGNORECASE,
 )
-"""What comes before a thing that is to be kept clear of."""
+"""Words before a thing to keep clear of."""
 NOT = re.compile(
     r"[,;]?\s*(?:(?:and|but)\s+)?(?:not|rather than|instead of)\s+"
     r"(?:(?:a?round|about|at)\s+)?(?:the\s+)?$",
     re.IGNORECASE,
 )
-"""What comes before a thing that is said not to be meant."""
+"""Words before a thing that is explicitly not meant."""
 SEVERAL = re.compile(
     r"\b(?:each|every|both|all)\b(?: of)?(?: the| these| those)?\s*$", re.IGNORECASE
 )
-"""What comes before a thing where more than one is meant."""
+"""Words before a thing where more than one is meant."""
 BARE = re.compile(r"left|right|upper|lower|top|bottom|first|second|third|last", re.IGNORECASE)
-"""An answer that says which and not what."""
+"""An answer that says which one but not what it is."""
 POLITE = re.compile(r"[ ,]*(?:please|thanks|thank you)?[ .!]*$", re.IGNORECASE)
 THE_THING = "the thing"
-"""Stands in the instruction for the one that is chosen."""
+"""Stands in the instruction for the thing that is chosen."""
 
 
 def shown_now(task: Task, before: History) -> tuple[dict[str, Any], ...]:
-    """What is pointed at with these words; what was with earlier ones is in their messages."""
+    """Return what this turn points at; what earlier turns pointed at is in their messages."""
     old = {p["id"] for m in before if isinstance(m, User) for p in read_task(m.text).pointed}
     return tuple(p for p in task.pointed if p["id"] not in {*old, *task.targets})
 
 
-def heeded(task: Task, followup: Followup) -> Followup:
-    """A follow-up in which what is newly pointed at has a part; else an instruction about that.
+def using_pointed(task: Task, followup: Followup) -> Followup:
+    """Return the follow-up if its edits use what is newly pointed at, else a new instruction.
 
-    It is refused where its words are no instruction.
+    It is a refusal if the words are not an instruction.
     """
     named = json.dumps(followup.edits)
     if not followup.edits or any(json.dumps(p["id"]) in named for p in task.pointed):
@@ -76,16 +76,16 @@ def heeded(task: Task, followup: Followup) -> Followup:
 
 
 def labelled(prompts: list[dict[str, Any]], things: Sequence[str]) -> list[dict[str, Any]]:
-    """What was pointed at, called as the words call it where they name one thing."""
+    """Return what was pointed at, labelled with the words for it if these name one thing."""
     label = re.sub(r"^(?:the|this|that) ", "", things[0]) if len(things) == 1 else ""
     named = set(label.lower().split()) - {"thing", "one", "object", "target"}
     return [{"label": label[:100], **prompts[0]}] if named and len(prompts) == 1 else prompts
 
 
 def narrowed(task: Task, history: History) -> Task | Step:
-    """The task about the one of the things pointed at that its words name, or what to do first.
+    """Return the task about the pointed thing that its words name, or the call needed first.
 
-    As it was, where they name none or all of them.
+    The task is about all things as before where the words do not single one out.
     """
     if task.pointed:
         task = replace(
@@ -122,9 +122,9 @@ def narrowed(task: Task, history: History) -> Task | Step:
 
 
 def chosen_by_answer(task: Task, answer: str, history: History) -> Task | None:
-    """The task about the one of several things pointed at that an answer names, as "t1" does.
+    """Return the task about the one of several pointed things that an answer names, such as "t1".
 
-    None where it names none or more than one, or says more than that.
+    None where the answer names none or more than one, or says more than that.
     """
     alone = POLITE.sub("", answer)
     spoken = f"the {alone} one" if BARE.fullmatch(alone) else alone
@@ -138,7 +138,7 @@ def chosen_by_answer(task: Task, answer: str, history: History) -> Task | None:
 def _things_named(
     task: Task, centres: dict[str, tuple[float, float]]
 ) -> tuple[Task, list[tuple[Chunk, str]]]:
-    """The phrases for things, each with its id or words; without those said not to be meant."""
+    """Return the task and its phrases for things with ids or words, without those denied."""
     things = tuple((str(p["id"]), str(p.get("label") or UNNAMED[0])) for p in task.pointed)
     contract: dict[str, Any] = {"groups": [{"relation": "around", "targets": [], "robots": 0}]}
     standing = Standing("", contract, (), things=things, centre=centres)
@@ -155,7 +155,7 @@ def _things_named(
 def _looked(
     things: Sequence[Reference], centres: dict[str, tuple[float, float]], history: History
 ) -> str | Step | None:
-    """The one that a description fits, by its looks alone where nothing found is of its noun."""
+    """Return the one a description fits, by looks alone if none is of its noun; or a call first."""
     found: str | Step | None = None
     for thing in things if len(things) == 1 else ():
         found = one_at(thing.whole_query, centres, history)
@@ -165,14 +165,14 @@ def _looked(
 
 
 def _quantity(task: Task, chunk: Chunk) -> str:
-    """The first word of a phrase."""
+    """Return the first word of a phrase."""
     return (task.instruction[chunk.start : chunk.end].split() or [""])[0]
 
 
 def _clear_of(
     task: Task, named: Sequence[tuple[Chunk, str]], centres: dict[str, tuple[float, float]]
 ) -> Task | None:
-    """The task about one thing pointed at, clear of the others; None where it is not said so."""
+    """Return the task about one pointed thing, clear of others; None if it does not say so."""
     text, off = task.instruction, dict[str, tuple[int, int]]()
     about: list[tuple[Chunk, str]] = []
     for chunk, name in named:
@@ -197,12 +197,12 @@ def _clear_of(
 
 
 def _shows(text: str, chunk: Chunk) -> bool:
-    """Whether a phrase means what is pointed at: "this bench"."""
+    """Return whether a phrase means what is pointed at: "this bench"."""
     return text[chunk.start : chunk.end].lower().startswith(("this ", "that "))
 
 
 def _centre(prompt: dict[str, Any]) -> tuple[float, float]:
-    """Where a thing that is pointed at lies, px."""
+    """Return the centre of the box around a pointed thing, px."""
     box: Sequence[float] | None = prompt.get("box")
     corners = None if box is None else [box[:2], box[2:]]
     points = np.asarray(prompt.get("outline") or corners or prompt.get("points") or [(0, 0)])

@@ -1,4 +1,4 @@
-"""Demands that part a team: so many on each side, in rows and rings, or beside the rest."""
+"""Demands that divide a team: so many on each side, in rows and rings, or beside the rest."""
 
 from collections.abc import Collection, Sequence
 from typing import Any
@@ -12,15 +12,15 @@ LONG_SIDES = ("long", "longer", "short", "shorter")
 
 
 class Portions:
-    """Carries over into a reading what its words say of parts of the team."""
+    """Rules that carry demands about parts of the team over into a reading."""
 
     def __init__(self, items: Sequence[Item], reading: Reading) -> None:
         self.items, self.reading = items, reading
-        self.per_side: Demand | None = None  # so many on each side, whose number is to be settled
+        self.per_side: Demand | None = None  # a count per side; how many sides is settled later
         self.some_sides: Demand | None = None
 
     def _set(self, name: str, value: Any) -> bool:
-        """Set a field, unless the words said something else of it before."""
+        """Set a field of the group; return False if it has another value already."""
         group = self.reading.group
         if group.get(name, value) != value:
             return False
@@ -48,7 +48,7 @@ class Portions:
         return not all(counts) or self._robots_are(sum(counts))
 
     def _each_side(self, demand: Demand) -> bool:
-        """Both sides, all four, or as many as the robots take that are so many on each."""
+        """Read a count per side: on both, on all four, or on as many as the robot count gives."""
         said = {self.items[k].symbol for k in range(demand.first, demand.last)}
         if self.reading.relation != "along" or self.reading.shares or self.per_side is not None:
             return False
@@ -66,13 +66,13 @@ class Portions:
         return per is not None and (not per or self._robots_are(per * len(named)))
 
     def _some_sides(self, demand: Demand) -> bool:
-        """Three sides, which are named there or by the one that is left free."""
+        """Read a number of sides, which are named there or by the one that is left free."""
         self.reading.meanings = [("around", 1.0), *self.reading.meanings]
         self.some_sides = demand
         return not demand.sides or self._only([*demand.sides])
 
     def unsettled(self) -> list[Demand]:
-        """The demands about sides that nothing else settles: how many they are, or which."""
+        """Return the demands about sides for which nothing settles how many they are, or which."""
         found: list[Demand] = []
         each, some, robots = self.per_side, self.some_sides, self.reading.robots
         if each is not None:
@@ -86,7 +86,7 @@ class Portions:
         return found
 
     def _rows_of(self, demand: Demand) -> bool:
-        """Two rows of five: a grid, or beside a thing one row outside the other."""
+        """Read "two rows of five": a grid, or beside a thing one row outside the other."""
         rows, each = ([2, *(q.whole or 0 for q in demand.numbers)])[-2:]
         across = any(self.items[k].symbol == "columns" for k in range(demand.first, demand.last))
         if self.reading.relation == "along" and rows == 2:
@@ -100,7 +100,7 @@ class Portions:
         return True
 
     def _further(self, demand: Demand) -> bool:
-        """Robots beside the arrangement: "and one in the middle"."""
+        """Read robots in addition to the arrangement: "and one in the middle"."""
         count = demand.numbers[0].whole
         if not count or self.reading.relation not in ("around", "cage", "corners"):
             return False
@@ -115,7 +115,7 @@ class Portions:
         return self.reading.relation in ("around", "cage", "along")
 
     def _rings_of(self, demand: Demand) -> bool:
-        """Two rings of six, or four in the inner ring and six in the outer one."""
+        """Read two rings of six, or four in the inner ring and six in the outer one."""
         counts = [q.whole or 0 for q in demand.numbers]
         if demand.value == "alike":
             rings, counts = (2, counts * 2) if len(counts) == 1 else (counts[0], counts[1:] * 2)

@@ -1,4 +1,4 @@
-"""What was understood of an instruction, as one value."""
+"""The value that an instruction is read into."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -6,9 +6,9 @@ from typing import Any
 from .drawn_forms import Form
 
 SURE = 0.55
-"""Least probability of an arrangement that is carried out unasked, fitted on other authors."""
+"""Least probability to carry out an arrangement without asking, fitted on other authors' words."""
 SURE_RING, SURE_EITHER_RING = 0.45, 0.8
-"""Least probabilities of the likelier kind of ring, and of both, where no other is likely."""
+"""Least probabilities of the likelier kind of ring, and of both kinds together."""
 
 
 @dataclass
@@ -18,24 +18,24 @@ class Reading:
     Attributes:
         meanings: arrangements that may be meant with their probabilities, likeliest first.
         robots: how many; None where the words do not say.
-        odd_count: words for a number of robots that is none, or "".
-        group: fields of the contract's group beside relation, targets and robots. Lengths px.
+        odd_count: words for a number of robots that is not a whole number above 0, or "".
+        group: fields of the contract's group beside relation, targets and robots. Lengths in px.
         robot_radius: px, where the words state it.
-        shares: numbers of robots on sides, where the words part them so; 0 for an equal share.
-        further: robots on a side, or at the "centre", beside the arrangement.
-        one_a_corner: whether each corner takes one.
+        shares: sides and their numbers of robots, where the words divide them; 0: an equal share.
+        further: a side or "centre" and its number of robots, in addition to the arrangement.
+        one_a_corner: whether each corner takes one robot.
         rings: how many rings or rows, one outside the other.
-        ring_counts: how many robots stand in each of them, the inner one first, where that is said.
-        form: what the robots draw, where they draw something.
-        place: around, inside or along, where words stand before the thing that say so of a form.
+        ring_counts: how many robots stand in each of them, the inner one first, where given.
+        form: the form that the robots draw, if any.
+        place: around, inside or along, if the words before the thing say so of a form; else "".
         things: phrases for the thing or things that the arrangement is about.
         others: phrases for things to stay clear of.
         faced: phrase for the thing that the side of a row faces, or "".
         stops: why it is no order to place robots now, each a kind and the words for it.
         unread: words that no rule took.
         background: words that change nothing.
-        language: another one than English that it is in, or "".
-        unscaled: metric lengths that a picture without a scale says nothing of.
+        language: the language of an instruction that is not in English, or "".
+        unscaled: metric lengths, which a picture without a scale cannot give in px.
     """
 
     meanings: list[tuple[str, float]]
@@ -61,12 +61,12 @@ class Reading:
 
     @property
     def relation(self) -> str:
-        """The likeliest arrangement."""
+        """The arrangement that comes first in `meanings`."""
         return self.meanings[0][0]
 
     @property
     def sure(self) -> bool:
-        """Whether it is likely enough to be carried out unasked."""
+        """Whether the arrangement is likely enough to be carried out without asking."""
         (first, likely), *others = self.meanings
         if likely >= SURE:
             return True

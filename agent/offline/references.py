@@ -1,6 +1,6 @@
-"""Which things an instruction speaks of, and what is left of it for the arrangement.
+"""Reader of the things that an instruction refers to.
 
-What is understood becomes a query that code decides on measures. What is not is kept, so that
+What is understood becomes a query that is decided on measures. What is not is recorded, so that
 the planner can say so.
 """
 
@@ -12,7 +12,7 @@ from .phrases import HEADS, STOPS, Words, phrase, several, table
 
 
 def described(phrases: Sequence[str]) -> tuple[Reference, ...]:
-    """The things that noun phrases in English refer to; those that take up another are left out.
+    """Return the things that English noun phrases refer to, without repeated mentions.
 
     What is not understood of a phrase is among the `unknown` words of its thing.
     """
@@ -22,7 +22,7 @@ def described(phrases: Sequence[str]) -> tuple[Reference, ...]:
         if words and words[0] not in table()["determiners"]:
             words = ["the", *words]
         found += _described_all(words)
-    return _without_echoes(found)
+    return _without_repeats(found)
 
 
 def _described_all(words: Words) -> list[Reference]:
@@ -48,7 +48,7 @@ def _split_words(text: str) -> list[str]:
 
 
 def _read_reference(words: Words, at: int) -> tuple[Reference, int] | None:
-    """The thing that is spoken of from a place on, known or not, and where it ends."""
+    """Return the thing, known or not, whose phrase begins at a word, and the end of the phrase."""
     if words[at] not in table()["determiners"] or words[at + 1 : at + 2] == []:
         return None
     if words[at + 1] in table()["verbs"] or _is_about_a_part(words, at + 1):
@@ -57,7 +57,7 @@ def _read_reference(words: Words, at: int) -> tuple[Reference, int] | None:
 
 
 def _described(words: Words, at: int) -> tuple[Reference, int] | None:
-    """The thing whose description begins with the determiner at a place, and where it ends."""
+    """Return the thing whose description begins with a determiner, and the description's end."""
     description = Description(words, at + 1)
     thing, end = description.thing, description.at
     if thing.strange or _is_robots(words, at, end):
@@ -90,7 +90,7 @@ def _described(words: Words, at: int) -> tuple[Reference, int] | None:
 
 
 def _or_another(words: Words, at: int) -> bool:
-    """Whether it goes on with a second thing that has no article: "or blue heart", "and star"."""
+    """Return whether a second thing without article follows: "or blue heart", "and star"."""
     if words[at : at + 1] not in (["or"], ["and"], ["nor"], ["plus"], [","]):
         return False
     second = phrase(words, at + 1) if at + 1 < len(words) else None
@@ -104,7 +104,7 @@ def _or_another(words: Words, at: int) -> bool:
 
 
 def _part_follows(words: Words, at: int) -> bool:
-    """Whether a part comes after an owner: left side, very centre."""
+    """Return whether a part follows an owner: left side, very centre."""
     for k, word in enumerate(words[at : at + 4], start=at):
         found = phrase(words, k)
         if found is not None and found.kind in HEADS:
@@ -117,7 +117,7 @@ def _part_follows(words: Words, at: int) -> bool:
 
 
 def _ends_there(words: Words, at: int) -> bool:
-    """Whether no other noun comes: "left side", not "left neighbour"."""
+    """Return whether no other noun follows: "left side", not "left neighbour"."""
     lists = table()
     while at < len(words) and (words[at] in lists["parts"] or words[at] == "hand"):
         at += 1
@@ -126,7 +126,7 @@ def _ends_there(words: Words, at: int) -> bool:
 
 
 def _from_another(words: Words, at: int) -> bool:
-    """Whether it goes on with where it is seen from a thing named before: "to its left"."""
+    """Return whether a place relative to a thing named before follows: "to its left"."""
     relation = phrase(words, at)
     if relation is not None and relation.kind == "relations":
         return words[at + relation.length : at + relation.length + 1] in (["it"], ["them"])
@@ -134,7 +134,7 @@ def _from_another(words: Words, at: int) -> bool:
 
 
 def _stranger(words: Words, at: int) -> tuple[Reference, int] | None:
-    """A thing of a kind that is not known: "the dog", "the parrot nearest to the ring"."""
+    """Return a thing of an unknown kind: "the dog", "the parrot nearest to the ring"."""
     lists = table()
     known = (*lists["follow"], *lists["parts"], *lists["blockers"], *STOPS)
     end = at + 1
@@ -155,7 +155,7 @@ def _stranger(words: Words, at: int) -> tuple[Reference, int] | None:
 
 
 def _is_about_a_part(words: Words, at: int) -> bool:
-    """Whether it goes on like "left side of", "four corners of", "very middle of"."""
+    """Return whether words continue like "left side of", "four corners of", "very middle of"."""
     for k in range(at, min(at + 4, len(words) - 1)):
         found = phrase(words, k)
         if words[k] in STOPS or (found is not None and found.kind in HEADS):
@@ -169,17 +169,17 @@ def _is_about_a_part(words: Words, at: int) -> bool:
 
 
 def _is_robots(words: Words, at: int, end: int) -> bool:
-    """The robots themselves, as in "the six robots"."""
+    """Return whether words are for the robots themselves, as in "the six robots"."""
     return any(w.rstrip("s") in table()["robots"] for w in words[at : end + 1])
 
 
 def _may_own(word: str) -> bool:
-    """Whether "WORD of the thing" is about where robots stand, not about another thing."""
+    """Return whether "WORD of the thing" is about where robots stand, not another thing."""
     return word in table()["parts"] or word in table()["owned"]
 
 
 def _trailing(words: Words, at: int) -> int:
-    """How many words after a description go on about the thing without being understood."""
+    """Return how many words after a description still describe the thing but are not understood."""
     lists = table()
     if at >= len(words) or words[at] in STOPS or words[at].isdecimal():
         return 0
@@ -203,8 +203,8 @@ def _trailing(words: Words, at: int) -> int:
     return count
 
 
-def _without_echoes(things: Sequence[Reference]) -> tuple[Reference, ...]:
-    """The things without those that only take up another one: "that thing", "the coin" again."""
+def _without_repeats(things: Sequence[Reference]) -> tuple[Reference, ...]:
+    """Return the things without repeated mentions: "that thing", "the coin" again."""
     telling = [t for t in things if t.query or t.unknown or t.refused or t.noun != "any"]
     kept: list[Reference] = []
     for thing in telling or things:

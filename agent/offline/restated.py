@@ -1,7 +1,7 @@
-"""A first instruction together with the answers to questions about it: what is meant in the end.
+"""A first instruction together with the answers to questions about it: what is finally meant.
 
-An answer counts for words that were not understood where it says all that they can have said; what
-it does not say is asked about again, and what was left out for it is told.
+An answer replaces words that were not understood if it says all that they can have meant; other
+such words are asked about again, and those left out for the answer are reported.
 """
 
 import re
@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from ...tools.formation.number_words import numbers_in
 from ..first_message import Task
 from .accounting import read_instruction
-from .amending import amended
+from .amending import with_last_count
 from .reading import Reading
 from .several import shares
-from .spelling import instructed
+from .spelling import normalized_instruction
 
 SIDE = re.compile(
     r"\b(?:left|right|top|bottom|upper|lower|above|below|north|south|east|west)\b", re.I
@@ -25,7 +25,7 @@ CORRECTING = re.compile(
     r"|[ ,]+(?:instead|rather|please|then)(?=\W*$)",
     re.IGNORECASE,
 )
-"""What only says that an answer corrects what was said."""
+"""Words of an answer that only mark it as a correction."""
 RATHER = re.compile(
     r"(?:the |on |at )*(?P<new>[\w -]+?) (?:rather than|instead of|and not|not) (?:the |on |at )*"
     r"(?P<old>[\w -]+?)\W*$",
@@ -37,11 +37,11 @@ LEFT_OUT = re.compile(
     r"(?: part| bit| word| words)?(?: out| away| then| please)*\W*",
     re.IGNORECASE,
 )
-"""An answer that has what was not understood left out, as the question offers."""
+"""An answer that agrees to leave out what was not understood, as the question offers."""
 
 
 def is_question(answer: str, scale: float | None) -> bool:
-    """Whether an answer is a question of the person's own."""
+    """Return whether an answer is a question of the person's own."""
     return any(kind == "a question" for kind, _ in read_instruction(answer, scale).stops)
 
 
@@ -50,9 +50,9 @@ class Restated:
     """A first instruction with the answers to questions about it.
 
     Attributes:
-        text: what is to be read.
+        text: the text to read.
         open: words beside it that are still to be asked about.
-        left_out: words that were not understood, for which an answer counts.
+        left_out: words that were not understood and that an answer replaces.
     """
 
     text: str
@@ -61,8 +61,8 @@ class Restated:
 
 
 def restated(task: Task, answers: Sequence[str]) -> Restated:
-    """What answers, in their order, to questions about the instruction of a task make of it."""
-    said, scale = Restated(instructed(task.instruction)), task.metres_per_pixel
+    """Return a task's instruction as restated by answers, in their order."""
+    said, scale = Restated(normalized_instruction(task.instruction)), task.metres_per_pixel
     for answer in answers:
         if not answer.isdecimal() and not is_question(answer, scale):
             said = _with_answer(said, answer, scale)
@@ -70,7 +70,7 @@ def restated(task: Task, answers: Sequence[str]) -> Restated:
 
 
 def _with_answer(said: Restated, answer: str, scale: float | None) -> Restated:
-    """The instruction with one answer more."""
+    """Return the instruction with one more answer."""
     corrected = _corrected(said.text, answer)
     if corrected is not None:
         return replace(said, text=corrected)
@@ -82,8 +82,8 @@ def _with_answer(said: Restated, answer: str, scale: float | None) -> Restated:
     if shares(said.text):
         return replace(said, text=f"{said.text} . {answer}")
     unread, text = [*said.open, *read_instruction(said.text, scale).unread], said.text
-    clear = not (alone.unread or alone.unscaled) and _says(alone)
-    counts = [quote for quote in unread if clear and _said_in(quote) <= _said_in(answer)]
+    clear = not (alone.unread or alone.unscaled) and _is_informative(alone)
+    counts = [quote for quote in unread if clear and _fact_kinds(quote) <= _fact_kinds(answer)]
     for quote in unread:
         text = text.replace(quote, " ", 1)
     return Restated(
@@ -94,8 +94,8 @@ def _with_answer(said: Restated, answer: str, scale: float | None) -> Restated:
 
 
 def _corrected(text: str, answer: str) -> str | None:
-    """The instruction with one word for another, where that is all that an answer says."""
-    recounted = amended(f"{text}, {answer}")
+    """Return the instruction corrected by an answer that only replaces a word, else None."""
+    recounted = with_last_count(f"{text}, {answer}")
     if recounted != f"{text}, {answer}":
         return recounted
     plain = CORRECTING.sub("", answer)
@@ -110,11 +110,11 @@ def _corrected(text: str, answer: str) -> str | None:
     return None
 
 
-def _says(reading: Reading) -> bool:
+def _is_informative(reading: Reading) -> bool:
     return bool(reading.robots or reading.group or reading.things or reading.sure)
 
 
-def _said_in(words: str) -> set[str]:
-    """Whether words speak of numbers, and of sides."""
+def _fact_kinds(words: str) -> set[str]:
+    """Return the kinds of facts that words contain: "number", "side"."""
     said = {"number": numbers_in(words), "side": SIDE.findall(words)}
     return {kind for kind, found in said.items() if found}

@@ -20,11 +20,11 @@ THEN = re.compile(
 )
 
 Step = Callable[[Task, History, History, bool], Reply]
-"""The next step for a task, of the messages of its turn and those before; whether it came later."""
+"""Next step for a task, from its turn's messages, those before, and whether it is a later stage."""
 
 
 def stages_of(task: Task) -> tuple[str, ...]:
-    """The instructions that words give one after the other; one where not all can be read so."""
+    """Return the instructions that words give in sequence; just one if not all can be read so."""
     parts = THEN.split(FIRST.sub("", task.instruction))
     if len(parts) < 2 or not task.deploy or task.standing:
         return (task.instruction,)
@@ -35,7 +35,7 @@ def stages_of(task: Task) -> tuple[str, ...]:
 
 
 def in_stages(task: Task, turn: History, before: History, step: Step) -> Reply:
-    """The next step of instructions that are carried out one after the other."""
+    """Return the next step of instructions that are carried out one after the other."""
     first, stages = turn[0], stages_of(task)
     told: list[str] = []
     left, stage = turn[1:], replace(task, instruction=stages[0])
@@ -43,15 +43,15 @@ def in_stages(task: Task, turn: History, before: History, step: Step) -> Reply:
         mine, later = _until_arrived(left)
         reply = step(stage, (first, *mine), before, bool(told))
         if later is None:
-            return _following_on(told, reply)
+            return _with_earlier_texts(told, reply)
         told.append(reply.text)
         before, left = (*before, first, *mine), later
         stage = _next_stage(task, words, mine)
-    return _following_on(told, step(stage, (first, *left), before, bool(told)))
+    return _with_earlier_texts(told, step(stage, (first, *left), before, bool(told)))
 
 
 def _until_arrived(messages: History) -> tuple[History, History | None]:
-    """The messages of a stage and those after it, None where robots have not all arrived."""
+    """Return a stage's messages and those after it, or None where not all robots have arrived."""
     for k, message in enumerate(messages):
         if isinstance(message, Result) and message.name == "deploy" and not message.error:
             if not json.loads(message.text).get("arrived"):
@@ -61,7 +61,7 @@ def _until_arrived(messages: History) -> tuple[History, History | None]:
 
 
 def _next_stage(task: Task, words: str, done: tuple[Message, ...]) -> Task:
-    """What comes then: of the thing before unless it names one, with as many robots."""
+    """Return the next stage's task: with as many robots, about the same thing if it names none."""
     proposed = [c for c in calls_in(done) if c.name == "propose_formation"][-1]
     groups = proposed.arguments["contract"]["groups"]
     reading = read_instruction(words, task.metres_per_pixel)
@@ -70,8 +70,8 @@ def _next_stage(task: Task, words: str, done: tuple[Message, ...]) -> Task:
     return replace(task, instruction=words, robots=robots, targets=tuple(things), pointed=())
 
 
-def _following_on(told: list[str], reply: Reply) -> Reply:
-    """A reply that ends the turn, or asks, after what was told of the stages before."""
+def _with_earlier_texts(told: list[str], reply: Reply) -> Reply:
+    """Return a reply; if it ends the turn or asks, the texts of the stages before come first."""
     said = " ".join(told)
     if not told:
         return reply

@@ -1,6 +1,6 @@
-"""A first instruction about several things: as many robots at each, or so many here, so many there.
+"""A first instruction about several things: as many robots at each, or a number for each thing.
 
-Its words about all robots are read as those of an instruction about one thing.
+Its words about all robots are read like those of an instruction about one thing.
 """
 
 import re
@@ -27,7 +27,7 @@ EACH = re.compile(
     r"(?: (?!(?:and|at|with|all|in|on|to|from|please|facing|then|but|of)\b)[a-z]+)?(?! ?corners?)",
     re.IGNORECASE,
 )
-"""What says that each of several things is meant: "half round each", "inside each court"."""
+"""Words by which each of several things is meant: "half round each", "inside each court"."""
 NUMBER = rf"[0-9]{{1,5}}|{'|'.join(sorted(SMALL, key=len, reverse=True))}"
 ROBOTS = r"(?:robots?|bots?|drones?|rovers?|units?|machines?|agents?)"
 SHARE = re.compile(
@@ -58,19 +58,19 @@ AFTER = re.compile(
     r"(?=\s*(?:[,;.]|and\b|$))",
     re.IGNORECASE,
 )
-"""A share said after its thing: "at the big coin 6 robots"."""
+"""A share named after its thing: "at the big coin 6 robots"."""
 BARE = re.compile(rf"\b({NUMBER}) (?=t[0-9]+\b)", re.IGNORECASE)
-"""A share of a thing that is called by its id: "6 t1, 6 t2"."""
+"""A share for a thing that is named by its id: "6 t1, 6 t2"."""
 SPLITTING = re.compile(r"\b(?:split|divide|share)\b(?: them| the team)?(?: up)?", re.IGNORECASE)
 OTHERS = re.compile(rf"\b(?:{NUMBER}) (?!{ROBOTS}|of\b)[a-z]+s\b", re.IGNORECASE)
 """A number of things, not of robots: "there are two coins"."""
 
 
 def about_several(task: Task, robots: int | None, history: History) -> Step | None:
-    """What to do first about several things; None where the words are about one.
+    """Return the step for several things; None where the words are about one.
 
     Args:
-        robots: how many, as far as that was said apart from the words.
+        robots: how many, if that was given apart from the words.
     """
     if task.standing:
         return None
@@ -79,7 +79,7 @@ def about_several(task: Task, robots: int | None, history: History) -> Step | No
 
 
 def _plain(text: str) -> str:
-    """The words with their shares as SHARE knows them."""
+    """Return the words with their shares rewritten so that SHARE matches them."""
     text = WITH.sub(r"\g<n> robots around \g<a> and \g<m> around \g<b>", text)
     for pattern, put in ((AFTER, r"\g<n> robots \g<at> \g<thing>"), (BARE, r"\1 around ")):
         text = pattern.sub(put, text) if len(pattern.findall(text)) > 1 else text
@@ -87,10 +87,10 @@ def _plain(text: str) -> str:
 
 
 def shares(text: str) -> list[re.Match[str]]:
-    """Where the words say how many go about which of several things."""
+    """Return the matches that say how many robots go to which of several things."""
     found = list(SHARE.finditer(_plain(text)))
     if any(BESIDE.match(f"{m['at']} {m['thing']}") for m in found):
-        return []  # of one thing two sides
+        return []  # these are two sides of one thing
     links = [a.string[a.end() : b.start()] for a, b in pairwise(found)]
     alike = {m["at"].lower().removeprefix("a") for m in found}
     fits = len(found) > 1 and len(alike) == 1 and all(BETWEEN.fullmatch(link) for link in links)
@@ -102,7 +102,7 @@ def _ids(task: Task) -> list[str]:
 
 
 def _about_each(task: Task, robots: int | None) -> Step | None:
-    """As many robots about each of several things that were pointed at."""
+    """Propose as many robots about each of several pointed things; None if it is not about each."""
     each, ids = EACH.search(task.instruction), _ids(task)
     if each is None or len(ids) < 2:
         return None
@@ -118,7 +118,7 @@ def _about_each(task: Task, robots: int | None) -> Step | None:
 
 
 def _in_shares(task: Task, robots: int | None, history: History) -> Step | None:
-    """So many robots about one thing, so many about another."""
+    """Propose the number of robots stated for each of several things; None if there are none."""
     text, found = task.instruction, shares(task.instruction)
     if not found:
         return None
@@ -137,13 +137,13 @@ def _in_shares(task: Task, robots: int | None, history: History) -> Step | None:
     if meant is None or isinstance(meant, Step):
         return meant
     ids, prompts = meant
-    before = re.sub(r"^\W*[0-9]+\W*$", "", before)  # the total, said by itself
+    before = re.sub(r"^\W*[0-9]+\W*$", "", before)  # the total, stated by itself
     one = f"{before}{total} robots {found[0]['at']} it{after}"
     return _proposed(task, one, total, dict(zip(ids, counts, strict=True)), prompts)
 
 
 def _counts(shares: Sequence[str], total: int | None) -> list[int]:
-    """The robots of each share; 0 where that is not known."""
+    """Return the number of robots of each share; 0 where that is not known."""
     counts: list[int] = []
     for share in shares:
         word = share.removeprefix("remaining ")
@@ -163,7 +163,7 @@ def _counts(shares: Sequence[str], total: int | None) -> list[int]:
 def _things(
     task: Task, phrases: Sequence[str], history: History
 ) -> tuple[list[str], Sequence[dict[str, Any]]] | Step | None:
-    """The ids of the things that words name and what to measure of them; what to do first."""
+    """Return the ids and target prompts of the things named, a call needed first, or None."""
     ids = _ids(task)
     if not ids:
         found = find(described(phrases), len(phrases), history)
@@ -193,7 +193,7 @@ def _proposed(
     counts: dict[str, int],
     prompts: Sequence[dict[str, Any]],
 ) -> Step:
-    """The proposal of groups that are alike, or what is asked first of the words about one."""
+    """Return the proposal of groups that are alike, or the question that has to come first."""
     reading = read_instruction(one, task.metres_per_pixel)
     alone = replace(task, instruction=one, pointed=task.pointed[:1], targets=())
     question = question_of(alone, reading, robots)

@@ -1,4 +1,4 @@
-"""The question asked where robots that keep who stands where find no order in which to go."""
+"""The question asked where robots with assigned places find no order in which to move."""
 
 from ..messages import History, Result
 from .choosing import Step, agrees, calls_in, declines
@@ -7,11 +7,11 @@ MAY_SHARE = "Shall the robots share the places among themselves? 1: yes; 2: no."
 
 
 def shared(refused: Result, messages: History) -> Step | str:
-    """The question or, after a yes, the change with places shared; else what there is to say."""
+    """Return the question or, after a yes, the edit with places shared; else the closing text."""
     why = str((refused.facts or {}).get("plain", refused.text))
     call = next(c for c in calls_in(messages) if c.id == refused.call_id)
     if all(edit["kind"] == "swap" for edit in call.arguments["edits"]):
-        return f"Nothing was changed: {why}"  # shared, they would stay as they are
+        return f"Nothing was changed: {why}"  # with places shared, robots would not move
     later = messages[messages.index(refused) + 1 :]
     answers = (m.text for m in later if isinstance(m, Result) and m.name == "ask_user")
     answer = next(answers, None)

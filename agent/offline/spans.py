@@ -1,7 +1,7 @@
-"""Where phrases for things begin and end, by rules over the trained labels.
+"""Rules over the trained labels for where phrases for things begin and end.
 
-The model labels word after word; a purpose, a side or a preposition that it takes into a phrase
-for a thing would be lost there, because such a phrase only says which thing is meant.
+The model labels word by word; a purpose, a side or a preposition that it includes in a phrase for
+a thing would be lost there, because such a phrase only says which thing is meant.
 """
 
 import re
@@ -16,7 +16,7 @@ from ...tools.formation.number_words import numbers_in
 
 SIDE = "(?:left|right|top|bottom|upper|lower)(?: - hand| hand)?"
 ONLY_SIDE = re.compile(f"it|(?:(?:the|its) )?{SIDE}(?: side| end| edge)?")
-"""Where at a thing, not which thing."""
+"""A phrase that says where at a thing, not which thing."""
 SIDE_OF = re.compile(
     f"(?:the |its )?(?:{SIDE}|(?:two |both )?(?:long|short)(?:er)?)"
     "(?: sides?| edges?| end| flanks?)? of "
@@ -27,14 +27,14 @@ FURTHER = re.compile(
     r"(?:(?:more|others?|further|extra|robots?|bots?|drones?|units?|ones?|of them|go|stand) )*"
     r"(?:on|at|to|along|in|above|below|over|under|beneath|underneath|left|right|by|around)\b"
 )
-"""How further robots begin that stand elsewhere: "and another two on the left"."""
+"""Beginning of words about further robots elsewhere: "and another two on the left"."""
 LONGEST_LEAD = 12
-"""Words of the longest such beginning."""
+"""Number of words of the longest such beginning."""
 COUNTED = re.compile(
     r"(?:the (?:exact |very )?middle(?= between )|"
     r"(?!one)(\w+) (?:to|at|on|in|around|round|along|inside)(?= ))"
 )
-"""What stands before a thing that is named last: "five to the lid", "the middle between"."""
+"""Words before a thing that is named last: "five to the lid", "the middle between"."""
 MIDDLE = re.compile("(?:the |its )(?:very |exact )?(?:centre|center|middle)")
 PURPOSE = frozenset(
     (("such", "that"), ("so", "that"), ("so", "they"), ("so", "it"), ("such", "a"), ("in", "order"))
@@ -44,7 +44,7 @@ OWNED_SIDE = re.compile(f"'s ({SIDE} (?:side|edge)|corners)$")
 
 
 def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
-    """The labels, without what is no phrase for a thing, or no part of one."""
+    """Return the labels with phrases for things corrected to what only says which thing."""
     found = list(labels)
     for start, end in _runs(found, "thing"):
         began = start
@@ -93,13 +93,13 @@ def _mark_beside(words: Sequence[str], found: list[str]) -> None:
 
 
 def _further(words: Sequence[str], at: int) -> int:
-    """Past-the-last of the words that begin further robots at a place; 0 where none do."""
+    """Return past-the-last index of words that begin further robots at a word; 0 if none do."""
     more = FURTHER.match(" ".join(words[at : at + LONGEST_LEAD]))
     return at + len(more[0].split()) if more is not None and numbers_in(more[0]) else 0
 
 
 def _behind_number(words: Sequence[str], start: int, end: int) -> int:
-    """Where a phrase for a thing begins behind a number of robots, or "the middle" between two."""
+    """Return where a phrase for a thing begins after a number of robots or "the middle" between."""
     more = _further(words, start) or _further(words, max(start - 1, 0))
     counted = COUNTED.match(" ".join(words[start:end]))
     if counted is not None and (counted[1] is None or numbers_in(counted[1])):
@@ -108,12 +108,12 @@ def _behind_number(words: Sequence[str], start: int, end: int) -> int:
 
 
 def _is_verb(words: Sequence[str], at: int) -> bool:
-    """Whether a word before a determiner is no noun: "circle the" at the very beginning."""
+    """Return whether a word before a determiner is a verb: "circle the" at the very beginning."""
     return at == 0 and len(words) > 1 and not may_open(words[0]) and may_open(words[1])
 
 
 def _after_verb(words: Sequence[str], start: int, end: int) -> int:
-    """Where a thing begins behind a verb nobody knows: "desired around" the court."""
+    """Return where a thing begins after an unknown verb: "desired around" the court."""
     opens = (k for k in range(start, end) if words[k] in _lists()["determiners"])
     first = next(opens, start)
     if first == start:
@@ -124,17 +124,17 @@ def _after_verb(words: Sequence[str], start: int, end: int) -> int:
 
 
 def may_open(word: str) -> bool:
-    """Whether a further phrase for a thing may begin with a word."""
+    """Return whether a further phrase for a thing may begin with a word."""
     return word in _lists()["opening"]
 
 
 def _ends_thing(word: str) -> bool:
-    """Whether a word or sign ends the words for a thing that stands in a demand."""
+    """Return whether a word or sign ends the words for a thing inside a demand."""
     return not word[0].isalnum() or word in (*_lists()["turned"], "that", "which", "and", "but")
 
 
 def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
-    """What the words of a phrase for a thing are, up to a purpose or a further number."""
+    """Return the labels of a phrase for a thing, up to a purpose or a further number."""
     phrase, count = " ".join(words[start:end]), end - start
     none = (*_lists()["no_thing"], *_lists()["begin_demand"])
     if phrase.startswith(none) or ONLY_SIDE.fullmatch(phrase):
@@ -158,7 +158,7 @@ def _thing_labels(words: Sequence[str], start: int, end: int) -> list[str]:
 
 
 def _up_to_next(words: Sequence[str], start: int, end: int, found: list[str]) -> list[str]:
-    """The labels of a phrase for a thing, up to where it goes on with something else."""
+    """Return the labels of a phrase for a thing, changed from where something else begins."""
     count = end - start
     for k in range(1, count):
         rest = " ".join(words[start + k : end])
@@ -174,7 +174,7 @@ def _up_to_next(words: Sequence[str], start: int, end: int, found: list[str]) ->
 
 
 def _place(words: Sequence[str], start: int, end: int) -> list[str]:
-    """What the words are that say where further robots stand."""
+    """Return the labels of words that say where further robots stand."""
     if start == end or MIDDLE.match(" ".join(words[start:end])) is not None:
         return ["demand"] * (end - start)
     if words[start] in _lists()["leading"]:
@@ -189,14 +189,14 @@ def _purpose(words: Sequence[str], start: int, end: int) -> int:
 
 
 def _passive(words: Sequence[str], start: int, end: int) -> int:
-    """Where "encircled by nine drones" begins in a phrase for a thing; its end where nowhere."""
+    """Return where "encircled by nine drones" begins in a phrase for a thing, else its end."""
     verbs = (k for k in range(start + 1, end - 2) if words[k].endswith("ed"))
     by = (k for k in verbs if words[k + 1] == "by" and numbers_in(" ".join(words[k + 2 : k + 4])))
     return next(by, end)
 
 
 def _runs(labels: Sequence[str], label: str) -> list[tuple[int, int]]:
-    """Where words of a label stand together: first, past-the-last."""
+    """Return the runs of words with a label, as first and past-the-last index."""
     bounds = [i for i in range(len(labels) + 1) if labels[i - 1 : i] != labels[i : i + 1] or i == 0]
     return [(a, b) for a, b in pairwise(bounds) if labels[a] == label]
 

@@ -1,4 +1,4 @@
-"""What stands when a later turn begins, as the planner is told it: the plan, robots and things."""
+"""The state at the beginning of a later turn, as the planner gets it: plan, robots and things."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,22 +9,22 @@ from .drawn_forms import SIDES
 
 @dataclass(frozen=True)
 class Standing:
-    """A plan that stands, and what was done to it last.
+    """The current plan, and what was done to it last.
 
     Attributes:
         plan: its id.
-        contract: of the plan, as JSON; lengths px.
+        contract: of the plan, as JSON; lengths in px.
         robots: ids in the order of positions.
         deployed: whether the robots stand there.
-        said: words of the turn before, whatever came of them.
-        words, edits: what was said last that changed the plan, and the changes; none at first.
+        said: words of the turn before, whatever their effect.
+        words, edits: the last words that changed the plan, and the changes; none at first.
         things: ids and labels of what was measured.
-        past: of the plans that undo goes back to, latest first: arrangements, and how many robots.
-        steps, redo: how many changes can be taken back, and how many made again.
+        past: the plans that undo goes back to, latest first, as arrangements and number of robots.
+        steps, redo: how many steps can be undone, including the first plan, and how many redone.
         centre: of each thing, px.
-        places: of each robot by its id, px, where words speak of them; else None.
-        pointed: ids of what this turn points at; `place`: the point, where it is one.
-        size: of the picture, px.
+        places: of each robot by its id, px, if the words refer to robots by place; else None.
+        pointed: ids of what this turn points at; `place`: the point, if it points at one.
+        size: width and height of the picture, px.
         metres_per_pixel: of the picture; None where it has no scale.
     """
 
@@ -48,7 +48,7 @@ class Standing:
 
     @classmethod
     def of(cls, facts: Mapping[str, Any], **told: Any) -> "Standing":
-        """From the line `Standing` of a turn's first message, and what else the turn is told."""
+        """Make it from the line `Standing` of a turn's first message, and further fields `told`."""
         last: dict[str, Any] = facts.get("last") or {}
         return cls(
             plan=facts["plan"],
@@ -77,12 +77,12 @@ class Standing:
 
     @property
     def relation(self) -> str:
-        """Of the first group."""
+        """The arrangement of the first group."""
         return str(self.groups[0]["relation"])
 
     @property
     def beside(self) -> str | None:
-        """Where by its target the first group's form or row is: "above"; None for what is round."""
+        """Where by its target the first group's form or row is: "above"; None if all round."""
         group = self.groups[0]
         shape: dict[str, Any] = group.get("shape") or {}
         where: str | None = shape.get("where")
@@ -90,7 +90,7 @@ class Standing:
 
     @property
     def targets(self) -> list[str]:
-        """Ids of what the groups are about, in order, once each."""
+        """Ids of what the groups are about, in order, without repeats."""
         return list(dict.fromkeys(t for group in self.groups for t in group.get("targets", ())))
 
     @property
@@ -100,10 +100,10 @@ class Standing:
 
     @property
     def changes(self) -> int:
-        """How many changes can be taken back, so that a plan still stands."""
+        """How many changes can be taken back with a plan still left."""
         return max(self.steps - 1, 0)
 
     def others(self) -> list[str]:
-        """Things known that no group is about; those pointed at in this turn come first."""
+        """Return known things that no group is about; those pointed at in this turn come first."""
         known = [*self.pointed, *(name for name, _ in self.things)]
         return [t for t in dict.fromkeys(known) if t not in self.targets]

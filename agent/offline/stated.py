@@ -1,6 +1,6 @@
-"""A contract of the person's own in the offline planner's place: no words are read.
+"""A contract of the person's own in place of the offline planner's: no words are read.
 
-Where they say otherwise than the contract, the contract is followed, and that is said.
+Where the words differ from the contract, the contract is followed, and the reply says so.
 """
 
 from dataclasses import replace
@@ -15,13 +15,13 @@ READING = "The contract is the person's own."
 
 
 class StatedContract(OfflinePlanner):
-    """Proposes a contract about what was pointed at, t1, t2, ...; goes on as the planner does."""
+    """Proposes a contract about what was pointed at, t1, t2, ..., then goes on like the planner."""
 
     def __init__(self, contract: Contract) -> None:
         self._contract = contract.model_dump(mode="json", exclude_defaults=True)
 
     async def reply(self, request: Request) -> Reply:
-        """The next step of a turn."""
+        """Return the next step of a turn."""
         first, *later = turn_of(request.messages)
         results = [m for m in later if isinstance(m, Result)]
         doubts = [d for m in results if m.cause == "doubt" for d in (m.facts or {})["doubts"]]
@@ -33,7 +33,7 @@ class StatedContract(OfflinePlanner):
                 id=f"call-{len(results) + 1}", name="propose_formation", arguments=arguments
             )
             return Reply(calls=(call,))
-        last = results[-1].model_copy(update={"cause": None})  # for which it would change its plan
+        last = results[-1].model_copy(update={"cause": None})  # else the planner would replan
         reply = await super().reply(replace(request, messages=(*request.messages[:-1], last)))
         if reply.calls or not doubts:
             return reply

@@ -1,8 +1,8 @@
-"""What the words of an instruction are there for: a small linear model, trained on sentences.
+"""The role of each word of an instruction, by a small linear model trained on sentences.
 
-It says of every word whether it belongs to the command, to a phrase for a thing, to a further
-demand or to the background, and which arrangement the command means, each with a probability.
-It is no language model: n-grams and weights in tagging.npz, made by `make wordings`.
+It tells whether a word belongs to the command, to a phrase for a thing, to a further demand or to
+the background, and which arrangement the command means, each with a probability. It is not a
+language model: n-grams and weights in tagging.npz, made by `make wordings`.
 """
 
 import re
@@ -23,27 +23,27 @@ from .spans import trimmed
 
 LABELS = ("command", "thing", "demand", "background")
 DEMAND, SURE_DEMAND = LABELS.index("demand"), 0.5
-"""Words are a demand only where that is at least so probable."""
+"""Index of the label, and its least probability for a word to get it."""
 MEANINGS = (
     *("around", "cage", "inside", "along", "corners", "between", "centre", "shape"),
     *("several", "ask"),
 )
-"""Arrangements that a command may mean; "ask": none that can simply be carried out."""
+"""Arrangements that a command may mean; "ask" for none that can simply be carried out."""
 ANY = "any"
-"""Stands in place of meanings for words that stood in commands of most."""
+"""Stands for all meanings, for words that occur in commands of most of them."""
 TAG_BUCKETS, MEANING_BUCKETS = 1 << 16, 1 << 15
-"""Features are hashed into so many weights a label."""
+"""Numbers of buckets that features are hashed into, with one weight per label or meaning."""
 TOKEN = re.compile(r"\d+(?:[.,]\d+)*|[^\W\d_]+(?:['\u2019][^\W\d_]+)*|[^\w\s]|_")
 SENTENCE_ENDS = frozenset(".!?;\n")
 ENDINGS = ("ing", "ed", "es", "s", "e")
 LONGEST = 4
-"""Words of the longest phrase of classes.yaml that is looked for."""
+"""Most words of a phrase of classes.yaml that is looked for."""
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Token:
-    """A word, a number in digits or a sign, lower case, and where it stands in the text."""
+    """A word, a number in digits or a sign, lower case, and its position in the text."""
 
     text: str
     start: int
@@ -51,18 +51,18 @@ class Token:
 
 
 def tokens(text: str) -> tuple[Token, ...]:
-    """The words of a text, in order."""
+    """Return the words, numbers and signs of a text, in order."""
     found = TOKEN.finditer(text)
     return tuple(Token(m[0].lower().replace("\u2019", "'"), m.start(), m.end()) for m in found)
 
 
 @dataclass(frozen=True)
 class Tagging:
-    """What words are there for.
+    """The roles of words, and the meaning of the command.
 
     Attributes:
         labels: one of LABELS for each token.
-        certainty: the probability of each label, 0 to 1.
+        certainty: the probability of each label, 0 to 1, before phrases for things are corrected.
         meaning: probabilities of the MEANINGS of the command.
     """
 
@@ -72,11 +72,11 @@ class Tagging:
 
 
 def tag(words: Sequence[Token], may_command: Sequence[bool] = ()) -> Tagging:
-    """The most likely labels of the words of one instruction, and the meaning of its command.
+    """Return the most likely labels of an instruction's words, and the meaning of its command.
 
     Args:
         words: of the instruction.
-        may_command: for each word whether it can be one of the command; left out, all can.
+        may_command: for each word whether it can belong to the command; by default all can.
     """
     model, texts = in_use(), [w.text for w in words]
     labels, certainty = model.labels(texts, may_command)
@@ -92,10 +92,10 @@ class LinearModel:
 
     Attributes:
         emission: (TAG_BUCKETS, L) weights of features for labels.
-        transition: (L, L) from a label to the next.
+        transition: (L, L) weights from a label to the next.
         command: (MEANING_BUCKETS, M) weights of features for meanings.
-        temperature: softmax of meanings is of scores divided by it, so that it is calibrated.
-        words: stems of words that stood in commands, and the meanings they stood in.
+        temperature: divides the scores of meanings before the softmax, to calibrate it.
+        words: stems of words that occurred in training commands, and the meanings of those.
     """
 
     emission: Floats
@@ -107,11 +107,11 @@ class LinearModel:
     def labels(
         self, words: Sequence[str], may_command: Sequence[bool] = ()
     ) -> tuple[tuple[str, ...], tuple[float, ...]]:
-        """The likeliest label of each word, demands only where they are sure, and its probability.
+        """Return each word's likeliest label, demands only if probable enough, and its probability.
 
         Args:
             words: of one instruction.
-            may_command: for each word whether it can be one of the command.
+            may_command: for each word whether it can belong to the command; if empty, all can.
         """
         if not words:
             return (), ()
@@ -128,14 +128,14 @@ class LinearModel:
         )
 
     def meaning(self, words: Sequence[str], labels: Sequence[str]) -> dict[str, float]:
-        """Probabilities of MEANINGS."""
+        """Return the probabilities of MEANINGS."""
         scores = self.command[meaning_features(words, labels)].sum(axis=0) / self.temperature
         shares = np.exp(scores - scores.max())
         return dict(zip(MEANINGS, (shares / shares.sum()).tolist(), strict=True))
 
 
 def _marginals(scores: Floats, transition: Floats) -> Floats:
-    """(N, L) marginal probabilities of labels by the forward-backward algorithm."""
+    """Return marginal probabilities (N, L) of labels by the forward-backward algorithm."""
     forward, backward = scores.copy(), np.zeros_like(scores)
     for i in range(1, len(scores)):
         forward[i] += np.logaddexp.reduce(forward[i - 1][:, None] + transition, axis=0)
@@ -161,13 +161,13 @@ def lent(model: LinearModel) -> Generator[None]:
 
 
 def in_use() -> LinearModel:
-    """The model that reads."""
+    """Return the model that reads: the one lent, else the shipped one."""
     return _lent.get() or shipped()
 
 
 @cache
 def shipped() -> LinearModel:
-    """The weights in tagging.npz, each array stored as whole numbers and a step."""
+    """Load the model from tagging.npz, where each array is stored as whole numbers and a step."""
     with resources.files(__package__ or "").joinpath("tagging.npz").open("rb") as file:
         stored = dict(np.load(file))
     emission, transition, command = (
@@ -180,7 +180,7 @@ def shipped() -> LinearModel:
 
 
 def tag_features(words: Sequence[str]) -> list[list[int]]:
-    """The hashed features of each word, by its neighbourhood and its clause."""
+    """Return the hashed features of each word, from its neighbourhood and its clause."""
     plain = ["#" if w[0].isdigit() else w for w in words]
     around = ["<", "<", *plain, ">", ">"]
     opening, classes = _clauses(plain), [(), *word_classes(words), ()]
@@ -201,7 +201,7 @@ def tag_features(words: Sequence[str]) -> list[list[int]]:
 
 
 def word_classes(words: Sequence[str]) -> list[tuple[str, ...]]:
-    """The classes of classes.yaml that each word belongs to, alone or in a longer phrase."""
+    """Return the classes of classes.yaml of each word, alone or in a longer phrase."""
     stems = [stem(w) for w in words]
     found: list[set[str]] = [set() for _ in words]
     for start in range(len(words)):
@@ -226,16 +226,16 @@ def _classes() -> dict[tuple[str, ...], tuple[str, ...]]:
 
 
 def stem(word: str) -> str:
-    """A word without the ending of its form."""
+    """Return a word without its inflectional ending."""
     return next(
         (word[: -len(e)] for e in ENDINGS if word.endswith(e) and len(word) - len(e) >= 3), word
     )
 
 
 def _clauses(words: Sequence[str]) -> list[tuple[str, str, str, str, str]]:
-    """For each word the first two of its clause and the first of its sentence, where it stands.
+    """Return for each word the first two words of its clause, and the first of its sentence.
 
-    The last two tell whether the clause is first or last, and whether it counts something.
+    Two more texts say whether the clause is first and last, and whether it contains a number.
     """
     bounds = [
         0,
@@ -258,7 +258,7 @@ def _clauses(words: Sequence[str]) -> list[tuple[str, str, str, str, str]]:
 
 
 def meaning_features(words: Sequence[str], labels: Sequence[str]) -> list[int]:
-    """The hashed n-grams of what is not a phrase for a thing; those of the command count apart."""
+    """Return hashed n-grams of all but phrases for things, with and without the background."""
     names: list[str] = ["bias"]
     for kinds, label in zip(word_classes(words), labels, strict=True):
         names += [f"{label}:{kind}" for kind in kinds]

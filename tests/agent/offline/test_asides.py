@@ -1,7 +1,7 @@
 """What only tells something beside a command, and counts that are taken back."""
 
 import pytest
-from formup.agent.offline.amending import amended
+from formup.agent.offline.amending import with_last_count
 from formup.agent.offline.followups import read_followup
 from formup.agent.offline.standing import Standing
 
@@ -66,4 +66,4 @@ def test_the_robot_that_is_told_of_is_the_one_that_moves() -> None:
     ],
 )
 def test_the_number_that_is_said_last_counts(words: str, meant: str) -> None:
-    assert amended(words) == meant
+    assert with_last_count(words) == meant
