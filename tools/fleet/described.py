@@ -15,6 +15,7 @@ from .recording import RecordedSettings
 from .registry import FLEETS
 from .ros.settings import RosSettings
 from .vda5050.settings import Vda5050Settings
+from .wire.settings import WireSettings
 
 KINDS: Mapping[str, type[Value]] = {
     "mqtt": MqttSettings,
@@ -102,6 +103,26 @@ def described_as(kind: type[Model], path: Path) -> Model:
         camera, frame = settings.camera.beside(path.parent)
         settings = settings.model_copy(update={"camera": camera, "frame": frame})
     return settings
+
+
+def to_be_stopped(path: Path) -> WireSettings:
+    """What a file says of robots that can be stopped by another process than the one that drives.
+
+    Raises:
+        InputError: it cannot be read, or does not describe such; names every mistake.
+    """
+    kind = content_of(path, BEGIN).get("fleet")
+    if kind == "simulated":
+        raise InputError(
+            f"{path} describes simulated robots: they are in the program that drives them, so "
+            "there is nothing to be stopped from outside; stop them there, with Ctrl-C."
+        )
+    if kind == "recorded":
+        raise InputError(
+            f"{path} describes recorded robots: they are never driven, so there is nothing to be "
+            "stopped."
+        )
+    return described_as(WireSettings, path)
 
 
 def schema() -> dict[str, Any]:

@@ -11,7 +11,7 @@ from ..described import described_as
 from ..protocol import FleetRequest
 from ..wire.fleet import SETTLED, Point, Reason, WireFleet
 from .link import Link, Message
-from .messages import HOLD, goal_of, hold_of, pose_message, stamped, twist
+from .messages import CANCEL, HOLD, goal_of, hold_of, pose_message, stamped, twist
 from .settings import GOALS, RosSettings
 from .tracking import velocity
 
@@ -26,6 +26,8 @@ ECHOES = 100
 """What was said, for each robot, that is known again when it comes back."""
 SUCCEEDED = 4
 """As of action_msgs/GoalStatus."""
+ALL_GOALS = {"goal_info": {"goal_id": {"uuid": [0] * 16}, "stamp": {"sec": 0, "nanosec": 0}}}
+"""As of action_msgs/CancelGoal: those of other programs too, which alone know their ids."""
 OF_PROGRAMS = ("end", "gone")
 """Begin messages to hold that no person sent: a drive of another program ended."""
 
@@ -79,6 +81,9 @@ class RosFleet(WireFleet):
         for robot, (goal, _) in self._sent.items():
             action = self._goal_of[robot]
             messages.append({"op": "cancel_action_goal", "action": action, "id": goal})
+        if self._ros.drive_by == "nav2" and reason == "stop":
+            services = [f"{action}{CANCEL}" for action in self._goal_of.values()]
+            messages += [{"op": "call_service", "service": s, "args": ALL_GOALS} for s in services]
         self._link.say(*messages, surely=True)
         for of_a_drive in (self._sent, self._aims, self._failed):
             of_a_drive.clear()

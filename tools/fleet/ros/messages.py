@@ -14,6 +14,8 @@ SHOWN = 40
 UNIT_OFF = 0.1
 """How far the length of a quaternion may be from 1; one of zeros says that it is not known."""
 HOLD = "std_msgs/msg/String"
+CANCEL = "/_action/cancel_goal"
+"""After the name of an action, that of the service which cancels its goals."""
 
 
 class _Part(BaseModel):

@@ -13,7 +13,7 @@ from ..wire.fleet import Point
 from ..wire.stand_in import StandIns
 from .bridge import StandInBridge
 from .link import Message
-from .messages import goal_of, stamped
+from .messages import CANCEL, goal_of, stamped
 from .settings import RosSettings
 
 GAP = 4
@@ -97,9 +97,9 @@ class RosStandIns(StandIns):
             self._goes(self._goals[topic], goal_of(message.get("msg")))
         elif op == "send_action_goal":
             self._acts(message)
-        elif op == "cancel_action_goal":
+        elif op in ("cancel_action_goal", "call_service"):
             for robot, (goal, action) in [*self._acting.items()]:
-                if goal == message.get("id"):
+                if goal == message.get("id") or f"{action}{CANCEL}" == message.get("service"):
                     self.hold([robot])
                     self._result(robot, goal, action, CANCELED)
 

@@ -17,12 +17,14 @@ from ..mqtt.link import Link
 from ..protocol import FleetRequest
 from ..wire.fleet import HOLDING, Point, Reason, WireFleet
 from .hearing import KINDS, Hearing
-from .messages import Writer, action
+from .messages import Writer, action, read
 from .orders import AGAIN, TAKEN, Order
 from .settings import Vda5050Settings
 
 PAUSE, GO_ON, CANCEL = "startPause", "stopPause", "cancelOrder"
 ENDED = ("FINISHED", "FAILED")
+OF_MASTERS = ("order", "instantActions")
+"""What those say who drive; we do not hear ourselves."""
 
 
 @dataclass
@@ -51,7 +53,7 @@ class Vda5050Fleet(WireFleet):
         self._hearing = Hearing(settings, self.poses, self._ask)
         self._orders: dict[str, Order] = {}
         self._instant: dict[str, Instant] = {}
-        listened = [settings.topic("+", kind) for kind in (*KINDS, "order")]
+        listened = [settings.topic("+", kind) for kind in (*KINDS, *OF_MASTERS)]
         self.link = self._link = Link(settings.address, listened, self._heard, left=self._left)
 
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
@@ -81,6 +83,7 @@ class Vda5050Fleet(WireFleet):
                 order, state = self._orders.pop(robot, None), vehicle.state or {}
                 vehicle.order = None
                 stopped = reason == "stop" and (not state or bool(state["nodeStates"]))
+                stopped = stopped and not self._pausing(robot)  # which is told until it is heard
                 if stopped or (order is not None and not (state and order.done(state))):
                     self._tell(robot, [PAUSE, CANCEL] if reason == "stop" else [CANCEL])
 
@@ -119,8 +122,9 @@ class Vda5050Fleet(WireFleet):
         }
         answers = [said.get(act["actionId"]) for act in told.actions]
         if all(answer in ENDED for answer in answers):
+            pausing = self._pausing(robot)
             del self._instant[robot]
-            if told.actions[0]["actionType"] == PAUSE:
+            if pausing:
                 self._tell(robot, [GO_ON])
         elif now > told.begun + TAKEN:
             del self._instant[robot]
@@ -129,12 +133,25 @@ class Vda5050Fleet(WireFleet):
             self._say(robot, "instantActions", {"actions": told.actions})
         return robot in self._instant
 
+    def _pausing(self, robot: str) -> bool:
+        told = self._instant.get(robot)
+        return told is not None and told.actions[0]["actionType"] == PAUSE
+
+    def _heard_another(self, topic: str, payload: bytes) -> None:
+        """Note what another program told a vehicle: a pause is a person's stop."""
+        if topic.endswith("/order"):
+            self.saw_others()
+            return
+        message = read(self._settings.version, "instantActions", payload) or {"actions": []}
+        if any(act["actionType"] == PAUSE for act in message["actions"]):
+            self.latch()
+
     def _heard(self, topic: str, payload: bytes) -> None:
         now = time.monotonic()
         with self._lock:
-            if topic.endswith("/order"):  # not one of ours: these are not heard
+            if topic.endswith(OF_MASTERS):
                 if self._hearing.robot_of(topic):
-                    self.saw_others()
+                    self._heard_another(topic, payload)
                 return
             robot = self._hearing.heard(topic, payload)
             if robot is None:
