@@ -25,6 +25,7 @@ KINDS: Mapping[str, type[Value]] = {
 }
 """What a file says of robots that are not simulated, by its `fleet`."""
 Model = TypeVar("Model", bound=Value)
+Wire = TypeVar("Wire", bound=WireSettings)
 SUFFIXES = (".yaml", ".yml")
 BEGIN = "fleet: simulated"
 
@@ -99,9 +100,22 @@ def described_as(kind: type[Model], path: Path) -> Model:
         kinds = (f"`fleet: {name}`" for name, model in KINDS.items() if issubclass(model, kind))
         raise InputError(f"{path} describes other robots; begin it with {' or '.join(kinds)}.")
     settings = validated(path, "a fleet", found, content)
-    if isinstance(settings, MqttSettings) and settings.camera is not None:
+    if isinstance(settings, WireSettings) and settings.camera is not None:
         camera, frame = settings.camera.beside(path.parent)
         settings = settings.model_copy(update={"camera": camera, "frame": frame})
+    return settings
+
+
+def described_for(kind: type[Wire], request: FleetRequest) -> Wire:
+    """What the file of a request says of robots of a kind that are elsewhere.
+
+    Raises:
+        InputError: as of `described_as`; or the file's camera has not seen the request's picture.
+    """
+    assert request.config is not None  # see `fleet_named`
+    settings = described_as(kind, request.config)
+    if settings.camera is not None:
+        settings.camera.check_seen(request.size)
     return settings
 
 

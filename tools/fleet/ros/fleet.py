@@ -7,9 +7,10 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from ..described import described_as
+from ..described import described_for
 from ..protocol import FleetRequest
 from ..wire.fleet import SETTLED, Point, Reason, WireFleet
+from ..wire.poses import PoseMessage
 from .link import Link, Message
 from .messages import CANCEL, HOLD, goal_of, hold_of, pose_message, stamped, twist
 from .settings import GOALS, RosSettings
@@ -40,14 +41,14 @@ class RosFleet(WireFleet):
     def __init__(self, settings: RosSettings) -> None:
         super().__init__(settings)
         self._ros, self._me = settings, uuid.uuid4().hex[:12]
-        self._seen_at, self._sent_at = settings.poses, settings.goals
+        self._seen_at, self._sent_at = settings.read, settings.goals
         self._goal_of = {robot: topic for topic, robot in self._sent_at.items()}
         self._said = {robot: deque[Point](maxlen=ECHOES) for robot in settings.robots}
         self._aims: dict[str, Point] = {}
         self._sent: dict[str, tuple[str, Point]] = {}
         self._failed: dict[str, str] = {}
         kind, hold = GOALS[settings.drive_by][1], (settings.topics.hold, HOLD)
-        topics = [(topic, settings.pose_type) for topic in settings.poses]
+        topics = [(topic, settings.pose_type) for topic in self._seen_at]
         goals = [(topic, kind) for topic in settings.goals if settings.drive_by != "nav2"]
         if settings.drive_by == "nav2":
             self.ahead = NAV2_AHEAD
@@ -58,6 +59,7 @@ class RosFleet(WireFleet):
             self._heard,
             left=self.poses.forget,
         )
+        self.see_tags(self._judged)
 
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
         """Tell robots where to go; see `WireFleet.send`."""
@@ -145,6 +147,9 @@ class RosFleet(WireFleet):
             if new and goal not in self._said[robot] and not zero:
                 self.saw_others()
 
+    def _judged(self, robot: str, seen: PoseMessage) -> PoseMessage:
+        return seen.model_copy(update={"fault": self._failed.get(robot)})
+
     def _ended(self, message: Message) -> None:
         """Note that Nav2 gave up a goal that was its robot's last."""
         for robot, (goal, _) in [*self._sent.items()]:
@@ -158,7 +163,7 @@ def open_fleet(request: FleetRequest) -> RosFleet:
     """The robots of the file that was given.
 
     Raises:
-        InputError: it does not describe robots that run ROS 2.
+        InputError: it does not describe robots that run ROS 2, or its camera has not seen the
+            picture.
     """
-    assert request.config is not None  # see `fleet_named`
-    return RosFleet(described_as(RosSettings, request.config))
+    return RosFleet(described_for(RosSettings, request))

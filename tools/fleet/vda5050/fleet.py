@@ -12,10 +12,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..described import described_as
+from ..described import described_for
 from ..mqtt.link import Link
 from ..protocol import FleetRequest
 from ..wire.fleet import HOLDING, Point, Reason, WireFleet
+from ..wire.poses import PoseMessage
 from .hearing import KINDS, Hearing
 from .messages import Writer, action, read
 from .orders import AGAIN, TAKEN, Order
@@ -55,6 +56,7 @@ class Vda5050Fleet(WireFleet):
         self._instant: dict[str, Instant] = {}
         listened = [settings.topic("+", kind) for kind in (*KINDS, *OF_MASTERS)]
         self.link = self._link = Link(settings.address, listened, self._heard, left=self._left)
+        self.see_tags(self._judged)
 
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
         """Take robots further along their orders; see `WireFleet.send`."""
@@ -162,6 +164,10 @@ class Vda5050Fleet(WireFleet):
                 vehicle.order = order.hindrance(vehicle.state, now)
                 self._hearing.judge(robot)
 
+    def _judged(self, robot: str, seen: PoseMessage) -> PoseMessage | str:
+        with self._lock:
+            return self._hearing.seen(robot, seen)
+
     def _left(self) -> None:
         """The broker is gone, and with it all that was said."""
         with self._lock:
@@ -181,7 +187,6 @@ def open_fleet(request: FleetRequest) -> Vda5050Fleet:
     """The vehicles of the file that was given.
 
     Raises:
-        InputError: it does not describe such vehicles.
+        InputError: it does not describe such vehicles, or its camera has not seen the picture.
     """
-    assert request.config is not None  # see `fleet_named`
-    return Vda5050Fleet(described_as(Vda5050Settings, request.config))
+    return Vda5050Fleet(described_for(Vda5050Settings, request))

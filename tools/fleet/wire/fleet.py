@@ -35,6 +35,7 @@ from ..protocol import (
 from ..seen_things import Look, SeenThings
 from .poses import Poses
 from .settings import WireSettings
+from .tagged import Judge, TagWatch, all_believed
 
 WAIT = 3.0
 """Seconds for which robots are waited for that have not been seen since the broker was found."""
@@ -80,7 +81,8 @@ class WireFleet(ABC):
     """Robots elsewhere, as a file describes them; what they are told is up to who derives from it.
 
     Attributes:
-        poses: what is believed of where they are; to be fed with what they say.
+        poses: what is believed of where they are; to be fed with what they say, where no camera
+            sees them.
         link: what connects them; to be set before the fleet is used.
         ahead: see `AHEAD`.
         look: the newest frame of the camera above the robots; None where there is none.
@@ -100,6 +102,7 @@ class WireFleet(ABC):
         self._others = -OTHERS
         self.poses = Poses(settings)
         self._things: SeenThings | None = None
+        self._tags: TagWatch | None = None
 
     @abstractmethod
     def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
@@ -113,6 +116,12 @@ class WireFleet(ABC):
     @abstractmethod
     def hold(self, reason: Reason) -> None:
         """Tell all robots to hold, at once; later, surely, where they cannot be told now."""
+
+    def see_tags(self, judge: Judge = all_believed) -> None:
+        """Have poses come from the camera from now on, where the file has one."""
+        if self.settings.camera is not None:
+            self._tags = TagWatch(self.settings.camera, self.poses, judge)
+            self.look = self._tags.top_view
 
     async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
         """Poses as they were seen last; robots are waited for a while when none were yet."""
@@ -212,11 +221,13 @@ class WireFleet(ABC):
         self.stopped = False
 
     async def close(self) -> None:
-        """Hold the robots if they are driven, and let go of the broker."""
+        """Hold the robots if they are driven, and let go of what connects them, and the camera."""
         if self._driving:
             self.hold("end")
         self._closed = True
         await asyncio.to_thread(self.link.close)
+        if self._tags is not None:
+            await asyncio.to_thread(self._tags.close)
 
     def saw_others(self) -> None:
         """Note that another program has just driven these robots."""
