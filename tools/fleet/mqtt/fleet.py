@@ -36,10 +36,15 @@ class MqttFleet(WireFleet):
         )
         self.see_tags()
 
-    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+    def send(
+        self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]
+    ) -> None:
         """Tell robots where to go; see `WireFleet.send`."""
         for robot, (x, y) in goals.items():
-            message = {"drive": drive, "seq": seq, "x": round(x, 6), "y": round(y, 6)}
+            message: dict[str, str | float] = {"drive": drive, "seq": seq}
+            message |= {"x": round(x, 6), "y": round(y, 6)}
+            if robot in looks:
+                message["heading"] = round(looks[robot], 6)
             self._link.say(self._topics.goal.replace("{robot}", robot), message)
 
     def hold(self, reason: Reason) -> None:

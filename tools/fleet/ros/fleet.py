@@ -61,17 +61,20 @@ class RosFleet(WireFleet):
         )
         self.see_tags(self._judged)
 
-    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+    def send(
+        self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]
+    ) -> None:
         """Tell robots where to go; see `WireFleet.send`."""
         for robot, place in goals.items():
+            look = looks.get(robot)
             if self._ros.drive_by == "nav2":
-                self._navigate(robot, place, f"{drive}-{seq}-{robot}")
+                self._navigate(robot, (place, look), f"{drive}-{seq}-{robot}")
             elif self._ros.drive_by == "cmd_vel":
-                told = self._velocity(robot, place)
+                told = self._velocity(robot, place, look)
                 self._publish(robot, told, twist(told))
             else:
                 place = round(place[0], 6), round(place[1], 6)
-                self._publish(robot, place, self._stamped(robot, place))
+                self._publish(robot, place, self._stamped(robot, place, look))
 
     def hold(self, reason: Reason) -> None:
         """Tell all robots to hold; see `WireFleet.hold`."""
@@ -100,21 +103,24 @@ class RosFleet(WireFleet):
         assert pose is not None  # nothing is sent before all were seen
         return frame.to_robots(pose.x, pose.y), frame.turned_back(pose.heading or 0.0)
 
-    def _velocity(self, robot: str, goal: Point) -> Point:
+    def _velocity(self, robot: str, goal: Point, look: float | None) -> Point:
         limits, near = (
             (self._ros.speed, self._ros.turn_speed),
             NEAR * self._ros.frame.metres_per_pixel,
         )
-        ahead, about = velocity(*self._looks(robot), goal, limits, near)
+        ahead, about = velocity(*self._looks(robot), goal, limits, near, look)
         return round(ahead, 6), round(about, 6)
 
-    def _stamped(self, robot: str, goal: Point) -> dict[str, Any]:
-        """A goal that a robot has come to looking as it drives there."""
-        (x, y), _ = self._looks(robot)
-        return stamped(self._ros.frame_id, goal, math.atan2(goal[1] - y, goal[0] - x))
+    def _stamped(self, robot: str, goal: Point, look: float | None) -> dict[str, Any]:
+        """A goal; where a robot may look any way, it does as it drives there, and then as it is."""
+        (x, y), looks = self._looks(robot)
+        if look is None and math.dist((x, y), goal) > SETTLED * self._ros.frame.metres_per_pixel:
+            look = math.atan2(goal[1] - y, goal[0] - x)
+        return stamped(self._ros.frame_id, goal, looks if look is None else look)
 
-    def _navigate(self, robot: str, place: Point, goal: str) -> None:
+    def _navigate(self, robot: str, end: tuple[Point, float | None], goal: str) -> None:
         """Send Nav2 another goal where that has moved on by a step, or has come to stand."""
+        place, look = end
         stands, self._aims[robot] = self._aims.get(robot) == place, place
         step = NAV2_STEP * NAV2_AHEAD * self._ros.speed
         if robot in self._sent:
@@ -123,7 +129,7 @@ class RosFleet(WireFleet):
                 return
         self._sent[robot] = goal, place
         name, kind = self._goal_of[robot], GOALS["nav2"][1]
-        args = {"pose": self._stamped(robot, place), "behavior_tree": ""}
+        args = {"pose": self._stamped(robot, place, look), "behavior_tree": ""}
         sent = {"action": name, "action_type": kind, "args": args, "feedback": False}
         self._link.say({"op": "send_action_goal", "id": goal, **sent})
 

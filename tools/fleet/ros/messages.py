@@ -122,6 +122,14 @@ def goal_of(message: Any) -> Point | None:
     return found if all(map(math.isfinite, found)) else None
 
 
+def look_of(message: Any) -> float | None:
+    """Which way a PoseStamped has a robot look; None of others."""
+    try:
+        return _yaw(_Quaternion.model_validate(message["pose"]["orientation"]))
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
 def hold_of(message: Any) -> str:
     """Why all are to hold, as the message has it, which may be anything."""
     try:

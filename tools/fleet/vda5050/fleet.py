@@ -58,7 +58,9 @@ class Vda5050Fleet(WireFleet):
         self.link = self._link = Link(settings.address, listened, self._heard, left=self._left)
         self.see_tags(self._judged)
 
-    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+    def send(
+        self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]
+    ) -> None:
         """Take robots further along their orders; see `WireFleet.send`."""
         now = time.monotonic()
         with self._lock:
@@ -71,7 +73,7 @@ class Vda5050Fleet(WireFleet):
                     start = self._settings.frame.to_robots(pose.x, pose.y)
                     order = Order(self._settings, drive, start, vehicle.state)
                     self._orders[robot], vehicle.order = order, None
-                order.go_on(goal, now)
+                order.go_on(goal, now, looks.get(robot))
                 if message := order.message(now):
                     self._say(robot, "order", message)
 

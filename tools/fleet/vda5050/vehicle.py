@@ -21,6 +21,7 @@ class Vehicle:
 
     Attributes:
         place: where it is, in its own frame.
+        heading: how it looks, radians.
         driving: whether it moves.
         base: nodes that it has yet to pass, each with the edge to it.
         last: id and number of the node that it passed last.
@@ -31,6 +32,7 @@ class Vehicle:
 
     settings: Vda5050Settings
     place: Point = (0.0, 0.0)
+    heading: float = 0.0
     driving: bool = False
     order: str = ""
     update: int = 0
@@ -103,6 +105,11 @@ class Vehicle:
         position = self.base[0][0]["nodePosition"]
         return position["x"], position["y"]
 
+    @property
+    def look(self) -> float | None:
+        """Which way it is to look at the next node; None for any."""
+        return self.base[0][0]["nodePosition"].get("theta") if self.base else None
+
     def state(self) -> Json:
         """What a vehicle says of itself, but for where it is."""
         dialect = self.settings.dialect
@@ -127,7 +134,12 @@ class Vehicle:
     def position(self) -> Json:
         """Where it says that it is."""
         dialect, (x, y) = self.settings.dialect, self.place
-        found: Json = {"x": round(x, 6), "y": round(y, 6), "theta": 0.0, "mapId": self.settings.map}
+        found: Json = {
+            "x": round(x, 6),
+            "y": round(y, 6),
+            "theta": self.heading,
+            "mapId": self.settings.map,
+        }
         return {dialect.position: found | {dialect.located: self.localised}}
 
     def _refusal(self, message: Json) -> Refusal | None:
@@ -153,7 +165,9 @@ class Vehicle:
         """Whether one is at a node as exactly as it wants."""
         position = node["nodePosition"]
         reach = self.settings.dialect.reach(position.get("allowedDeviationXY"))
-        return math.dist(self.place, (position["x"], position["y"])) <= reach
+        askew = math.remainder(position.get("theta", self.heading) - self.heading, math.tau)
+        turned = abs(askew) <= position.get("allowedDeviationTheta", 0.0)
+        return turned and math.dist(self.place, (position["x"], position["y"])) <= reach
 
 
 def _released(message: Json) -> list[Json]:

@@ -40,6 +40,7 @@ class WireSettings(Value, ABC):
         speed: greatest of a robot, per second.
         radius: of a robot.
         tracking_error: how far one that nothing pushes may come off the straight way to its goal.
+        turns: whether they turn to a heading at their goal; they have to say how they look then.
         period: seconds between goals.
         pose_timeout: robots that were not seen for so many seconds are held.
         watchdog: robots have to hold by themselves without a goal for so many seconds.
@@ -52,6 +53,7 @@ class WireSettings(Value, ABC):
     radius: Above0
     tracking_error: Above0
     frame: RobotFrame = RobotFrame(y="down")
+    turns: bool = False
     period: float = Field(default=0.05, ge=0.01, le=1)
     pose_timeout: Annotated[Seconds, Field(gt=0, le=10)] = 0.5
     watchdog: Annotated[Seconds, Field(gt=0, le=10)] = 0.5
