@@ -64,8 +64,12 @@ def check_stop_at_a_second_terminal(there: Any, fleet: Fleet) -> None:
     assert fleet.stopped
 
 
-def check_stop_while_the_driver_hangs(there: Any) -> None:
-    """Robots of a program that hangs stand; it does not go on when it comes to itself."""
+def check_stop_while_the_driver_hangs(there: Any, late: float = 0.5) -> None:
+    """Robots of a program that hangs stand; it does not go on when it comes to itself.
+
+    Args:
+        late: px that robots may go by a goal that was on its way out when it hung.
+    """
     with driven(there.path) as driver:
         wait_for(lambda: there.was_told("driving"))
         driver.send_signal(signal.SIGSTOP)
@@ -76,5 +80,5 @@ def check_stop_while_the_driver_hangs(there: Any) -> None:
         driver.send_signal(signal.SIGCONT)
         _, problem = driver.communicate()
         assert any(error in problem for error in GIVEN_UP), problem
-        assert abs(there.robots.points - held).max() < 0.5
+        assert abs(there.robots.points - held).max() < late
         assert stand(there)

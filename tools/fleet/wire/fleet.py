@@ -53,6 +53,9 @@ CALM, CALM_ASKEW = 0.5, 2.0
 it has yet to turn, which it may only be about to."""
 HOLDING = 1.0
 """Seconds in which robots that were told to hold have to stand."""
+LATE, LISTENING = 0.25, 0.3
+"""A program that sends goals so many seconds late has hung; it first listens for so many: somebody
+may have stopped the robots meanwhile."""
 OTHERS = 2.0
 """Seconds after which another program that sent goals is taken to have ended."""
 MOST_TOLD = 5
@@ -207,7 +210,11 @@ class WireFleet(ABC):
                     moving,
                 )
             joined, due = self.link.joined, time.monotonic()
+            before = due
             for seq in itertools.count(1):
+                if time.monotonic() > before + self.settings.period + LATE:
+                    await asyncio.sleep(LISTENING)
+                before = time.monotonic()
                 poses = self.poses.seen()
                 self._check_going(robots, stops, joined)
                 begun = True

@@ -4,11 +4,13 @@ import asyncio
 import threading
 import time
 from collections.abc import Callable
+from contextlib import aclosing
 from typing import Any
 
+import numpy as np
 import pytest
-from deploying import deployed
-from formup.tools.fleet.protocol import FleetStoppedError
+from deploying import SURE, deployed, wait_for
+from formup.tools.fleet.protocol import FleetStoppedError, Motion
 from formup.tools.fleet.wire import stopping
 from formup.tools.fleet.wire.stopping import stopped
 from outside import SLOW, check_stop_at_a_second_terminal, check_stop_while_the_driver_hangs
@@ -27,6 +29,39 @@ def test_a_stop_at_a_second_terminal_ends_a_deployment_until_a_person_says_go(la
 
 def test_robots_are_held_while_the_program_that_drives_them_hangs(lab: Labs) -> None:
     check_stop_while_the_driver_hangs(lab(watchdog=10).simulate())
+
+
+def test_a_program_that_hung_listens_before_it_sends_a_goal(lab: Labs) -> None:
+    said = list[str]()
+
+    def heard(topic: str, payload: bytes) -> None:
+        said.append(topic)
+
+    there = lab(**SURE).simulate()
+    goal = there.topic("goal", "a")
+    there.link(goal, heard=heard)
+
+    async def go() -> None:
+        fleet = there.fleet()
+
+        async def stops_soon() -> None:
+            await asyncio.sleep(0.1)
+            await fleet.stop()
+
+        first, *_ = await fleet.observe()
+        path = np.array([(first.x, first.y), (first.x + 200, first.y)])
+        async with aclosing(fleet.drive(Motion({first.id: path}))) as moving:
+            await anext(moving)
+            time.sleep(0.4)
+            stopping = asyncio.create_task(stops_soon())
+            with pytest.raises(FleetStoppedError):
+                await anext(moving)
+            await stopping
+        await fleet.close()
+
+    asyncio.run(go())
+    wait_for(lambda: there.was_told("told to hold"))
+    assert said == [goal]
 
 
 def silent(message: dict[str, Any], n: int) -> None:

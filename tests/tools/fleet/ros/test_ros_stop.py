@@ -10,6 +10,7 @@ from deploying import deployed, stand, wait_for
 from formup.tools.fleet.protocol import FleetStoppedError
 from formup.tools.fleet.ros.messages import stamped
 from formup.tools.fleet.wire import stopping
+from formup.tools.fleet.wire.fleet import AHEAD
 from formup.tools.fleet.wire.stopping import stopped
 from outside import SLOW, check_stop_at_a_second_terminal, check_stop_while_the_driver_hangs
 
@@ -31,7 +32,8 @@ def test_a_stop_at_a_second_terminal_ends_a_deployment_until_a_person_says_go(
 
 @pytest.mark.parametrize("by", MODES)
 def test_robots_are_held_while_the_program_that_drives_them_hangs(lab: Labs, by: str) -> None:
-    check_stop_while_the_driver_hangs(lab(drive_by=by, watchdog=10).simulate())
+    there = lab(drive_by=by, watchdog=10).simulate()
+    check_stop_while_the_driver_hangs(there, AHEAD * there.settings.speed)
 
 
 def test_goals_of_nav2_are_cancelled_whoever_sent_them(lab: Labs) -> None:
