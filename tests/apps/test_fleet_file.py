@@ -64,6 +64,19 @@ def test_a_plan_is_deployed_with_it(cli: Cli) -> None:
     assert "Robot 3 does not get on" in out + err
 
 
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("good.yaml", "there is nothing to be stopped"), ("seen.yaml", "never driven")],
+)
+def test_what_no_other_program_can_stop_is_told_in_a_sentence(
+    cli: Cli, tmp_path: Path, name: str, words: str
+) -> None:
+    (tmp_path / "seen.yaml").write_text("fleet: recorded\nfile: poses.csv\n")
+    code, out, err = cli("fleet", "stop", name)
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert f"{name} describes" in err and words in err
+
+
 def test_a_file_that_describes_none_is_refused_before_anything(cli: Cli, tmp_path: Path) -> None:
     (tmp_path / "bad.yaml").write_text("fleet: simulated\nwings: 2\n")
     for command in (("run", "scene.png", *RUN), ("serve", "--store", "sessions")):

@@ -131,7 +131,7 @@ def check_turns(plan: Plan, fleet: Fleet) -> None:
     if plan.formation.headings_deg and not fleet.turns:
         raise ToolError(
             f"Robots of the fleet {fleet.name} cannot be turned to a heading: leave `heading` out, "
-            "or use a fleet that can."
+            "or use a fleet that can (its file says `turns: true`)."
         )
 
 

@@ -15,6 +15,7 @@ from .recording import RecordedSettings
 from .registry import FLEETS
 from .ros.settings import RosSettings
 from .vda5050.settings import Vda5050Settings
+from .wire.settings import WireSettings
 
 KINDS: Mapping[str, type[Value]] = {
     "mqtt": MqttSettings,
@@ -24,6 +25,7 @@ KINDS: Mapping[str, type[Value]] = {
 }
 """What a file says of robots that are not simulated, by its `fleet`."""
 Model = TypeVar("Model", bound=Value)
+Wire = TypeVar("Wire", bound=WireSettings)
 SUFFIXES = (".yaml", ".yml")
 BEGIN = "fleet: simulated"
 
@@ -98,10 +100,43 @@ def described_as(kind: type[Model], path: Path) -> Model:
         kinds = (f"`fleet: {name}`" for name, model in KINDS.items() if issubclass(model, kind))
         raise InputError(f"{path} describes other robots; begin it with {' or '.join(kinds)}.")
     settings = validated(path, "a fleet", found, content)
-    if isinstance(settings, MqttSettings) and settings.camera is not None:
+    if isinstance(settings, WireSettings) and settings.camera is not None:
         camera, frame = settings.camera.beside(path.parent)
         settings = settings.model_copy(update={"camera": camera, "frame": frame})
     return settings
+
+
+def described_for(kind: type[Wire], request: FleetRequest) -> Wire:
+    """What the file of a request says of robots of a kind that are elsewhere.
+
+    Raises:
+        InputError: as of `described_as`; or the file's camera has not seen the request's picture.
+    """
+    assert request.config is not None  # see `fleet_named`
+    settings = described_as(kind, request.config)
+    if settings.camera is not None:
+        settings.camera.check_seen(request.size)
+    return settings
+
+
+def to_be_stopped(path: Path) -> WireSettings:
+    """What a file says of robots that can be stopped by another process than the one that drives.
+
+    Raises:
+        InputError: it cannot be read, or does not describe such; names every mistake.
+    """
+    kind = content_of(path, BEGIN).get("fleet")
+    if kind == "simulated":
+        raise InputError(
+            f"{path} describes simulated robots: they are in the program that drives them, so "
+            "there is nothing to be stopped from outside; stop them there, with Ctrl-C."
+        )
+    if kind == "recorded":
+        raise InputError(
+            f"{path} describes recorded robots: they are never driven, so there is nothing to be "
+            "stopped."
+        )
+    return described_as(WireSettings, path)
 
 
 def schema() -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..formation.value import Value
 from .moving import Above0
 from .physics import RobotId
-from .wire.settings import RobotFrame
+from .wire.frame import RobotFrame
 
 MOST_BYTES = 50_000_000
 

@@ -7,8 +7,11 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
+import cv2
 import pytest
+from drawn import SEEN, Drawn
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
 PATIENCE = 10.0
@@ -70,3 +73,13 @@ def brokers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., 
 def shared(brokers: Callable[..., Broker]) -> Broker:
     """One broker for all tests that leave it alone; each has topics of its own."""
     return brokers()
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+    """What a camera sees, for the fleet's file that is written beside its calibration."""
+    (tmp_path / "camera.yaml").write_text(SEEN.to_yaml())
+    camera = Drawn()
+    monkeypatch.setattr(cv2, "VideoCapture", camera)
+    yield camera
+    camera.over.set()

@@ -1,6 +1,7 @@
 """Robots elsewhere that are simulated, and deployments of them in which something happens."""
 
 import asyncio
+import math
 import os
 import re
 import shlex
@@ -17,20 +18,22 @@ from typing import Any, Generic, TypeVar
 import yaml
 from formup.tools.fleet.arrival import Arrival
 from formup.tools.fleet.assigning import assign_robots
-from formup.tools.fleet.deploy import deploy
+from formup.tools.fleet.deploy import ARRIVED_DEG, deploy
 from formup.tools.fleet.protocol import Fleet, Pose
 from formup.tools.fleet.wire.stand_in import StandIns
 from formup.tools.formation.contract import Contract, Group
-from formup.tools.formation.plan import make_plan
+from formup.tools.formation.headings import off_heading
+from formup.tools.formation.plan import Plan, make_plan
 from formup.tools.formation.site import Site
 from formup.tools.geometry.outline import make_outline
 
 SITE = Site({"t1": make_outline([(200, 200), (300, 200), (300, 300), (200, 300)])}, 640, 480)
-PLAN = make_plan(
-    Contract(groups=(Group(relation="around", targets=("t1",), robots=3),), robot_radius=5),
-    SITE,
-    "s",
+GROUP = Group(relation="around", targets=("t1",), robots=3)
+PLAN = make_plan(Contract(groups=(GROUP,), robot_radius=5), SITE, "s")
+AWAY = make_plan(
+    Contract(groups=(GROUP.model_copy(update={"heading": "away"}),), robot_radius=5), SITE, "s"
 )
+"""The same, but robots look away from the thing."""
 SURE = {"speed": 200, "pose_timeout": 1.0, "watchdog": 1.0}
 """Fast, and with time enough for a machine that does other things too."""
 PATIENCE = 10.0
@@ -108,7 +111,9 @@ def ended(make: Callable[..., Made]) -> Generator[Callable[..., Made]]:
         one.end()
 
 
-def deployed(lab: Any, fleet: Fleet, act: Act = lambda lab, fleet: None) -> Arrival:
+def deployed(
+    lab: Any, fleet: Fleet, act: Act = lambda lab, fleet: None, plan: Plan = PLAN
+) -> Arrival:
     """What comes of a deployment when something happens once robots are on their way."""
     begun: list[Pose] = []
     done = False
@@ -122,10 +127,22 @@ def deployed(lab: Any, fleet: Fleet, act: Act = lambda lab, fleet: None) -> Arri
             act(lab, fleet)
 
     async def go() -> Arrival:
-        robots = assign_robots(await fleet.observe(), PLAN.formation.points).robots
-        return (await deploy(PLAN, SITE, fleet, robots, watch=watch)).arrival
+        robots = assign_robots(await fleet.observe(), plan.formation.points).robots
+        return (await deploy(plan, SITE, fleet, robots, watch=watch)).arrival
 
     return asyncio.run(go())
+
+
+def check_headings(lab: Any) -> None:
+    """Robots are sent to headings, seen to look there, and truly do."""
+    fleet = lab.fleet()
+    arrival = deployed(lab, fleet, plan=AWAY)
+    assert arrival.arrived, arrival
+    asyncio.run(fleet.close())
+    frame = lab.settings.frame
+    for robot, wanted in zip(arrival.robots, AWAY.formation.headings_deg, strict=True):
+        look = math.degrees(frame.turned(lab.robots.heading(robot)))
+        assert off_heading(look, wanted or 0.0) <= ARRIVED_DEG, robot
 
 
 def stand(lab: Any) -> bool:

@@ -5,7 +5,6 @@ import time
 
 from ..wire.checkup import checkup
 from ..wire.poses import Poses
-from ..wire.tagged import TagWatch
 from .link import Link
 from .messages import pose_message
 from .settings import MqttSettings
@@ -28,12 +27,7 @@ def checked(settings: MqttSettings, seconds: float) -> tuple[list[str], bool]:
 
     listened = [pattern.replace("{robot}", "+") for pattern in (topics.pose, topics.goal)]
     link, guard = Link(settings.address, listened, heard), guarded(settings.address[2])
-    watch = settings.camera and TagWatch(settings.camera, poses)
-    try:
-        return checkup(settings, link, poses, others, seconds, guard)
-    finally:
-        if watch is not None:
-            watch.close()
+    return checkup(settings, link, poses, others, seconds, guard)
 
 
 def guarded(secure: bool) -> str:

@@ -1,14 +1,12 @@
 """The fleet of robots that speak plain JSON over MQTT."""
 
-import asyncio
 import json
 import time
 from collections.abc import Mapping
 
-from ..described import described_as
+from ..described import described_for
 from ..protocol import FleetRequest
 from ..wire.fleet import Point, Reason, WireFleet
-from ..wire.tagged import TagWatch
 from .link import Link
 from .messages import pose_message
 from .settings import MqttSettings
@@ -31,34 +29,31 @@ class MqttFleet(WireFleet):
         super().__init__(settings)
         self._topics, self._robot_of = settings.topics, settings.robot_of
         patterns = (self._topics.pose, self._topics.goal)
-        self._camera = settings.camera
         listened = [*(p.replace("{robot}", "+") for p in patterns), self._topics.hold]
         will = self._topics.hold, _holding("gone"), False
         self.link = self._link = Link(
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )
-        self._watch = self._camera and TagWatch(self._camera, self.poses)
-        self.look = self._watch and self._watch.top_view
+        self.see_tags()
 
-    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+    def send(
+        self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]
+    ) -> None:
         """Tell robots where to go; see `WireFleet.send`."""
         for robot, (x, y) in goals.items():
-            message = {"drive": drive, "seq": seq, "x": round(x, 6), "y": round(y, 6)}
+            message: dict[str, str | float] = {"drive": drive, "seq": seq}
+            message |= {"x": round(x, 6), "y": round(y, 6)}
+            if robot in looks:
+                message["heading"] = round(looks[robot], 6)
             self._link.say(self._topics.goal.replace("{robot}", robot), message)
 
     def hold(self, reason: Reason) -> None:
         """Tell all robots to hold; see `WireFleet.hold`."""
         self._link.say(self._topics.hold, _holding(reason), surely=True)
 
-    async def close(self) -> None:
-        """Let go of broker and camera; see `WireFleet.close`."""
-        await super().close()
-        if self._watch is not None:
-            await asyncio.to_thread(self._watch.close)
-
     def _heard(self, topic: str, payload: bytes) -> None:
         if (robot := self._robot_of(topic, self._topics.pose)) is not None:
-            if self._camera is None:
+            if self.settings.camera is None:
                 self.poses.heard(robot, pose_message(payload), time.monotonic())
         elif topic != self._topics.hold or payload in OF_PROGRAMS:
             self.saw_others()
@@ -72,8 +67,4 @@ def open_fleet(request: FleetRequest) -> MqttFleet:
     Raises:
         InputError: it does not describe robots on MQTT, or its camera has not seen the picture.
     """
-    assert request.config is not None  # see `fleet_named`
-    settings = described_as(MqttSettings, request.config)
-    if settings.camera is not None:
-        settings.camera.check_seen(request.size)
-    return MqttFleet(settings)
+    return MqttFleet(described_for(MqttSettings, request))

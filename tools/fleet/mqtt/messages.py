@@ -14,6 +14,8 @@ class GoalMessage(BaseModel):
         drive: names the drive it belongs to; after a hold, goals of the same drive are not obeyed.
         seq: a number that rises within a drive; what comes later with a lower one is not obeyed.
         x, y: in the robots' frame.
+        heading: which way it is to look there, radians about the x axis towards the y axis; left
+            out, any way.
     """
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
@@ -21,6 +23,7 @@ class GoalMessage(BaseModel):
     seq: int
     x: float
     y: float
+    heading: float | None = None
 
 
 def pose_message(payload: bytes) -> PoseMessage | None:

@@ -8,7 +8,6 @@ from pydantic import Field, StringConstraints, field_validator, model_validator
 
 from ...formation.value import Value
 from ..wire.settings import WireSettings
-from ..wire.tagged import TagSettings
 
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 Topic = Annotated[str, StringConstraints(pattern=r"^[^+#\x00-\x1f]{1,200}$")]
@@ -79,22 +78,9 @@ class MqttSettings(BrokerSettings):
 
     Attributes:
         topics: where their messages go.
-        camera: sees where they are; left out, they say so.
     """
 
     topics: Topics = Topics()
-    camera: TagSettings | None = None
-
-    @model_validator(mode="after")
-    def _all_tagged(self) -> Self:
-        if self.camera is None:
-            return self
-        tags = self.camera.tags
-        if set(tags) != set(self.robots) or len(set(tags.values())) < len(tags):
-            raise ValueError("camera.tags takes every robot, and a tag of its own for each")
-        if "frame" in self.model_fields_set:
-            raise ValueError("frame is that of the camera's calibration; leave it out")
-        return self
 
     def robot_of(self, topic: str, pattern: str) -> str | None:
         """The robot whose topic of a pattern this is; None where it is of another pattern."""

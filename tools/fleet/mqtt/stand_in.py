@@ -29,7 +29,9 @@ class MqttStandIns(StandIns):
 
     def _message(self, robot: str, place: Point) -> dict[str, Any] | None:
         """What a robot says; None for nothing."""
-        return {"seq": self.seq, "x": round(place[0], 6), "y": round(place[1], 6)}
+        said = {"seq": self.seq, "x": round(place[0], 6), "y": round(place[1], 6)}
+        looks = self.heading(robot)
+        return said if looks is None else {**said, "heading": round(looks, 6)}
 
     def _heard(self, topic: str, payload: bytes) -> None:
         if topic == self._topics.hold:  # whatever it says
@@ -40,4 +42,4 @@ class MqttStandIns(StandIns):
         except ValidationError:
             return
         robot = self._robot_of(topic, self._topics.goal) or ""
-        self.go(robot, goal.drive, goal.seq, (goal.x, goal.y))
+        self.go(robot, goal.drive, goal.seq, (goal.x, goal.y), goal.heading)

@@ -15,7 +15,7 @@ def checked(settings: RosSettings, seconds: float) -> tuple[list[str], bool]:
     Raises:
         InputError: as of `Link`.
     """
-    poses, others, heard_at, sent_at = Poses(settings), set[str](), settings.poses, settings.goals
+    poses, others, heard_at, sent_at = Poses(settings), set[str](), settings.read, settings.goals
 
     def heard(message: Message, new: bool) -> None:
         topic, said = str(message.get("topic")), message.get("msg")

@@ -14,6 +14,8 @@ SHOWN = 40
 UNIT_OFF = 0.1
 """How far the length of a quaternion may be from 1; one of zeros says that it is not known."""
 HOLD = "std_msgs/msg/String"
+CANCEL = "/_action/cancel_goal"
+"""After the name of an action, that of the service which cancels its goals."""
 
 
 class _Part(BaseModel):
@@ -118,6 +120,14 @@ def goal_of(message: Any) -> Point | None:
     except (KeyError, TypeError, ValueError):
         return None
     return found if all(map(math.isfinite, found)) else None
+
+
+def look_of(message: Any) -> float | None:
+    """Which way a PoseStamped has a robot look; None of others."""
+    try:
+        return _yaw(_Quaternion.model_validate(message["pose"]["orientation"]))
+    except (KeyError, TypeError, ValueError):
+        return None
 
 
 def hold_of(message: Any) -> str:

@@ -75,7 +75,7 @@ class RosSettings(WireSettings):
 
     @model_validator(mode="after")
     def _names_are_names(self) -> Self:
-        if "frame" not in self.model_fields_set:
+        if "frame" not in self.model_fields_set and self.camera is None:
             raise ValueError(
                 "say in `frame` how the map lies in the picture: metres_per_pixel, origin"
             )
@@ -91,6 +91,11 @@ class RosSettings(WireSettings):
     def poses(self) -> Mapping[str, str]:
         """The robots whose poses topics carry, by these."""
         return {self.topics.pose.replace("{robot}", robot): robot for robot in self.robots}
+
+    @property
+    def read(self) -> Mapping[str, str]:
+        """Those of `poses` that are listened to: none where a camera sees the robots."""
+        return self.poses if self.camera is None else {}
 
     @property
     def goals(self) -> Mapping[str, str]:

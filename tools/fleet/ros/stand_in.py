@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from ...geometry.outline import FloatArray
-from ..simulator import PERIOD, Simulator
+from ..simulator import PERIOD
 from ..wire.fleet import Point
-from ..wire.stand_in import StandIns
+from ..wire.stand_in import StandIns, Turning
 from .bridge import StandInBridge
 from .link import Message
-from .messages import goal_of, stamped
+from .messages import CANCEL, goal_of, look_of, stamped
 from .settings import RosSettings
 
 GAP = 4
@@ -24,7 +24,7 @@ THERE = 0.25
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
 
-class _Told(Simulator):
+class _Told(Turning):
     """Robots with wheels that are told speeds, not places.
 
     Attributes:
@@ -79,9 +79,7 @@ class RosStandIns(StandIns):
 
     def _message(self, robot: str, place: Point) -> dict[str, Any] | None:
         """What a robot says; None for nothing."""
-        looks = float(self._sim.headings[self._row[robot]])
-        heading = None if math.isnan(looks) else self._ros.frame.turned_back(looks)
-        message = stamped(self._ros.frame_id, place, heading)
+        message = stamped(self._ros.frame_id, place, self.heading(robot))
         sec, nanosec = divmod(round(self.seq * PERIOD * 1e9), 10**9)  # clocks of their own
         message["header"]["stamp"] = {"sec": sec, "nanosec": nanosec}
         if self._ros.pose_type.endswith("Odometry"):
@@ -94,16 +92,17 @@ class RosStandIns(StandIns):
             if self._ros.drive_by == "pose":
                 self.hold(self.robots)
         elif op == "publish" and topic in self._goals:
-            self._goes(self._goals[topic], goal_of(message.get("msg")))
+            self._goes(self._goals[topic], message.get("msg"))
         elif op == "send_action_goal":
             self._acts(message)
-        elif op == "cancel_action_goal":
+        elif op in ("cancel_action_goal", "call_service"):
             for robot, (goal, action) in [*self._acting.items()]:
-                if goal == message.get("id"):
+                if goal == message.get("id") or f"{action}{CANCEL}" == message.get("service"):
                     self.hold([robot])
                     self._result(robot, goal, action, CANCELED)
 
-    def _goes(self, robot: str, told: Point | None) -> None:
+    def _goes(self, robot: str, message: Any) -> None:
+        told = goal_of(message)
         if told is None:
             return
         now, by = time.monotonic(), self._ros.drive_by
@@ -117,17 +116,22 @@ class RosStandIns(StandIns):
         if by == "cmd_vel" or now - last > GAP * self._ros.period:
             drive = str(self._number)
         self._drives[robot] = drive, now
-        self.go(robot, drive, self._number, told)
+        self.go(robot, drive, self._number, told, self._look_of(message))
 
     def _acts(self, message: Message) -> None:
         goal, action = str(message.get("id")), str(message.get("action"))
-        robot, told = self._goals.get(action), goal_of((message.get("args") or {}).get("pose"))
+        args: Any = message.get("args") or {}
+        pose = args.get("pose")
+        robot, told = self._goals.get(action), goal_of(pose)
         if robot is None or told is None:
             return
         if robot in self._acting:
             self._result(robot, *self._acting[robot], ABORTED)
         self._acting[robot] = goal, action
-        self.go(robot, goal, 0, told)
+        self.go(robot, goal, 0, told, self._look_of(pose))
+
+    def _look_of(self, message: Any) -> float | None:
+        return look_of(message) if self._ros.turns else None
 
     def _result(self, robot: str, goal: str, action: str, status: int) -> None:
         del self._acting[robot]

@@ -12,19 +12,27 @@ ASKEW = 0.1
 
 
 def velocity(
-    place: Point, heading: float, goal: Point, limits: tuple[float, float], near: float
+    place: Point,
+    heading: float,
+    goal: Point,
+    limits: tuple[float, float],
+    near: float,
+    look: float | None = None,
 ) -> Point:
-    """Speed ahead and turn rate, per second; zero within `near` of the goal.
+    """Speed ahead and turn rate, per second; within `near` of the goal it drives no further.
 
     Args:
         heading: radians, about the x axis towards the y axis of the frame that all is in.
         limits: the greatest speed and turn rate.
+        look: the heading that it turns to there; None for any.
     """
     dx, dy = goal[0] - place[0], goal[1] - place[1]
     left = math.hypot(dx, dy)
-    if left <= near:
-        return 0.0, 0.0
     speed, turn_speed = limits
-    off = math.remainder(math.atan2(dy, dx) - heading, math.tau)
-    ahead = min(SLOWING * left, speed) * max(1 - abs(off) / ASKEW, 0.0)
+    if left <= near:
+        way, ahead = heading if look is None else look, 0.0
+    else:
+        way, ahead = math.atan2(dy, dx), min(SLOWING * left, speed)
+    off = math.remainder(way - heading, math.tau)
+    ahead *= max(1 - abs(off) / ASKEW, 0.0)
     return ahead, max(-turn_speed, min(TURNING * off, turn_speed))

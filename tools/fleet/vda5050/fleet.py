@@ -12,17 +12,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..described import described_as
+from ..described import described_for
 from ..mqtt.link import Link
 from ..protocol import FleetRequest
 from ..wire.fleet import HOLDING, Point, Reason, WireFleet
+from ..wire.poses import PoseMessage
 from .hearing import KINDS, Hearing
-from .messages import Writer, action
+from .messages import Writer, action, read
 from .orders import AGAIN, TAKEN, Order
 from .settings import Vda5050Settings
 
 PAUSE, GO_ON, CANCEL = "startPause", "stopPause", "cancelOrder"
 ENDED = ("FINISHED", "FAILED")
+OF_MASTERS = ("order", "instantActions")
+"""What those say who drive; we do not hear ourselves."""
 
 
 @dataclass
@@ -51,10 +54,13 @@ class Vda5050Fleet(WireFleet):
         self._hearing = Hearing(settings, self.poses, self._ask)
         self._orders: dict[str, Order] = {}
         self._instant: dict[str, Instant] = {}
-        listened = [settings.topic("+", kind) for kind in (*KINDS, "order")]
+        listened = [settings.topic("+", kind) for kind in (*KINDS, *OF_MASTERS)]
         self.link = self._link = Link(settings.address, listened, self._heard, left=self._left)
+        self.see_tags(self._judged)
 
-    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+    def send(
+        self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]
+    ) -> None:
         """Take robots further along their orders; see `WireFleet.send`."""
         now = time.monotonic()
         with self._lock:
@@ -67,7 +73,7 @@ class Vda5050Fleet(WireFleet):
                     start = self._settings.frame.to_robots(pose.x, pose.y)
                     order = Order(self._settings, drive, start, vehicle.state)
                     self._orders[robot], vehicle.order = order, None
-                order.go_on(goal, now)
+                order.go_on(goal, now, looks.get(robot))
                 if message := order.message(now):
                     self._say(robot, "order", message)
 
@@ -81,6 +87,7 @@ class Vda5050Fleet(WireFleet):
                 order, state = self._orders.pop(robot, None), vehicle.state or {}
                 vehicle.order = None
                 stopped = reason == "stop" and (not state or bool(state["nodeStates"]))
+                stopped = stopped and not self._pausing(robot)  # which is told until it is heard
                 if stopped or (order is not None and not (state and order.done(state))):
                     self._tell(robot, [PAUSE, CANCEL] if reason == "stop" else [CANCEL])
 
@@ -119,8 +126,9 @@ class Vda5050Fleet(WireFleet):
         }
         answers = [said.get(act["actionId"]) for act in told.actions]
         if all(answer in ENDED for answer in answers):
+            pausing = self._pausing(robot)
             del self._instant[robot]
-            if told.actions[0]["actionType"] == PAUSE:
+            if pausing:
                 self._tell(robot, [GO_ON])
         elif now > told.begun + TAKEN:
             del self._instant[robot]
@@ -129,12 +137,25 @@ class Vda5050Fleet(WireFleet):
             self._say(robot, "instantActions", {"actions": told.actions})
         return robot in self._instant
 
+    def _pausing(self, robot: str) -> bool:
+        told = self._instant.get(robot)
+        return told is not None and told.actions[0]["actionType"] == PAUSE
+
+    def _heard_another(self, topic: str, payload: bytes) -> None:
+        """Note what another program told a vehicle: a pause is a person's stop."""
+        if topic.endswith("/order"):
+            self.saw_others()
+            return
+        message = read(self._settings.version, "instantActions", payload) or {"actions": []}
+        if any(act["actionType"] == PAUSE for act in message["actions"]):
+            self.latch()
+
     def _heard(self, topic: str, payload: bytes) -> None:
         now = time.monotonic()
         with self._lock:
-            if topic.endswith("/order"):  # not one of ours: these are not heard
+            if topic.endswith(OF_MASTERS):
                 if self._hearing.robot_of(topic):
-                    self.saw_others()
+                    self._heard_another(topic, payload)
                 return
             robot = self._hearing.heard(topic, payload)
             if robot is None:
@@ -144,6 +165,10 @@ class Vda5050Fleet(WireFleet):
             if order is not None and vehicle.state is not None:
                 vehicle.order = order.hindrance(vehicle.state, now)
                 self._hearing.judge(robot)
+
+    def _judged(self, robot: str, seen: PoseMessage) -> PoseMessage | str:
+        with self._lock:
+            return self._hearing.seen(robot, seen)
 
     def _left(self) -> None:
         """The broker is gone, and with it all that was said."""
@@ -164,7 +189,6 @@ def open_fleet(request: FleetRequest) -> Vda5050Fleet:
     """The vehicles of the file that was given.
 
     Raises:
-        InputError: it does not describe such vehicles.
+        InputError: it does not describe such vehicles, or its camera has not seen the picture.
     """
-    assert request.config is not None  # see `fleet_named`
-    return Vda5050Fleet(described_as(Vda5050Settings, request.config))
+    return Vda5050Fleet(described_for(Vda5050Settings, request))

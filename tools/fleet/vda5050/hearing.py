@@ -93,13 +93,16 @@ class Hearing:
             return None
         if kind == "state":
             vehicle.state, vehicle.stated = message, now
-        elif now - vehicle.stated > STATE_AGE:
-            if now - vehicle.asked > ASK_AGAIN:
-                vehicle.asked = now
-                self._ask(robot)
+        elif not self._stated(robot, now):
             return None
         self._place(robot, message.get(self._settings.dialect.position), now)
         return robot
+
+    def seen(self, robot: str, said: PoseMessage) -> PoseMessage | str:
+        """What is believed of a vehicle that a camera sees: nothing without its state."""
+        if not self._stated(robot, time.monotonic()):
+            return "without a state"
+        return said.model_copy(update={"fault": self._poses.tracks[robot].fault})
 
     def judge(self, robot: str) -> str | None:
         """Note anew, and say, why a vehicle cannot drive; None if it can."""
@@ -111,6 +114,15 @@ class Hearing:
         found = "; ".join(words)[:MOST_WORDS] or None
         self._poses.tracks[robot].fault = found
         return found
+
+    def _stated(self, robot: str, now: float) -> bool:
+        """Whether the state of a vehicle is known; where it is not, it is asked for."""
+        vehicle = self.vehicles[robot]
+        known = now - vehicle.stated <= STATE_AGE
+        if not known and now - vehicle.asked > ASK_AGAIN:
+            vehicle.asked = now
+            self._ask(robot)
+        return known
 
     def _its_own(self, robot: str, message: Mapping[str, Any]) -> bool:
         """Whether a message has a header, and that of the robot whose topic it came in."""
@@ -132,7 +144,7 @@ class Hearing:
         vehicle = self.vehicles[robot]
         vehicle.position = position or vehicle.position
         fault = self.judge(robot)
-        if position is None or self._doubts(position):
+        if position is None or self._doubts(position) or self._settings.camera is not None:
             return
         vehicle.believed += 1
         x, y, heading = position["x"], position["y"], position["theta"]

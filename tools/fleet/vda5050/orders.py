@@ -17,6 +17,9 @@ STEP = AHEAD / 2
 WAITS = 0.2
 """or when the point ahead of it has not moved for so many: it is a bend, a halt or the end."""
 EXACT = 1e-6
+LOOKING = 0.01
+"""A vehicle that is to look somewhere does within so many radians."""
+MOST_THETA = 3.141592
 AGAIN = 0.5
 """Seconds after which an order that is not seen to be taken is sent again; then twice as many."""
 TAKEN = 4.0
@@ -37,18 +40,25 @@ class Order:
     ) -> None:
         self._settings, self.name = settings, name
         self._points, self._goal, self._since = [start], start, math.inf
+        self._looks: list[float | None] = [None]
         self._before: list[Any] = state.get("errors", [])
         self._taken, self._begun, self._known = True, 0.0, False
         self._due, self._pause = math.inf, AGAIN
 
-    def go_on(self, goal: Point, now: float) -> None:
-        """Take in a point further along the path, and release it where that is due."""
+    def go_on(self, goal: Point, now: float, look: float | None = None) -> None:
+        """Take in a point further along the path, and release it where that is due.
+
+        Args:
+            look: which way the vehicle is to look there; None for any.
+        """
         if math.dist(goal, self._goal) > EXACT:
             self._goal, self._since = goal, now
         way = math.dist(goal, self._points[-1])
-        waits = now - self._since >= WAITS and way > EXACT
+        further = way > EXACT or look != self._looks[-1]
+        waits = now - self._since >= WAITS and further
         if self._taken and (waits or way >= STEP * self._settings.speed):
             self._points.append(goal)
+            self._looks.append(look)
             self._taken, self._begun = False, now
             self._due, self._pause = now, AGAIN
 
@@ -57,8 +67,8 @@ class Order:
         if self._taken or now < self._due:
             return None
         self._due, self._pause = now + self._pause, 2 * self._pause
-        number, (begin, end) = self._number, self._points[-2:]
-        nodes = [self._node(2 * number, begin), self._node(2 * number + 2, end)]
+        number = self._number
+        nodes = [self._node(number), self._node(number + 1)]
         dialect = self._settings.dialect
         edge: dict[str, Any] = {
             "edgeId": f"{self.name}-{2 * number + 1}",
@@ -101,14 +111,18 @@ class Order:
     def _number(self) -> int:
         return len(self._points) - 2
 
-    def _node(self, number: int, place: Point) -> dict[str, Any]:
-        settings = self._settings
+    def _node(self, count: int) -> dict[str, Any]:
+        settings, number = self._settings, 2 * count
+        place, look = self._points[count], self._looks[count]
         position: dict[str, Any] = {
             "x": round(place[0], 6),
             "y": round(place[1], 6),
             "mapId": settings.map,
             "allowedDeviationXY": settings.dialect.deviation(settings.tracking_error),
         }
+        if look is not None:
+            position["theta"] = max(-MOST_THETA, min(round(look, 6), MOST_THETA))
+            position["allowedDeviationTheta"] = LOOKING
         return {
             "nodeId": f"{self.name}-{number}",
             "sequenceId": number,

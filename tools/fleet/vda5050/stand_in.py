@@ -45,10 +45,13 @@ class Vda5050StandIns(StandIns):
         with self._lock:
             for i, (name, robot) in enumerate(self.robots.items()):
                 place = self._settings.frame.to_robots(*self._sim.sensed[i].tolist())
-                goal = self.vehicles[name].go_on(place, bool(moved[i] > STANDS))
+                vehicle = self.vehicles[name]
+                vehicle.heading = round(self.heading(name) or 0.0, 5)
+                goal, look = vehicle.go_on(place, bool(moved[i] > STANDS)), vehicle.look
                 if (goal is None) != (robot.goal is None):
                     self._changes["standing" if goal is None else "driving"].append(name)
                 robot.goal = None if goal is None else self._settings.frame.to_picture(*goal)
+                robot.look = None if look is None else self._settings.frame.turned(look)
                 robot.said = time.monotonic()  # what one was told holds, however long ago
             super().step()
 

@@ -21,16 +21,18 @@ class Vehicle:
 
     Attributes:
         place: where it is, in its own frame.
+        heading: how it looks, radians.
         driving: whether it moves.
         base: nodes that it has yet to pass, each with the edge to it.
         last: id and number of the node that it passed last.
         end: likewise of the last that was released to it.
         cancelled: whether its order was, or it was switched to manual: no more of it is taken.
-        cancelling: the action that cancels the order, until the vehicle stands.
+        cancelling: the actions that cancel the order, until the vehicle stands.
     """
 
     settings: Vda5050Settings
     place: Point = (0.0, 0.0)
+    heading: float = 0.0
     driving: bool = False
     order: str = ""
     update: int = 0
@@ -38,7 +40,7 @@ class Vehicle:
     last: tuple[str, int] = ("", 0)
     end: tuple[str, int] = ("", 0)
     cancelled: bool = False
-    cancelling: Json | None = None
+    cancelling: list[Json] = field(default_factory=list[Json])
     paused: bool = False
     mode: str = "AUTOMATIC"
     emergency: str = "NONE"
@@ -73,7 +75,7 @@ class Vehicle:
         if kind in ("startPause", "stopPause"):
             self.paused = kind == "startPause"
         elif kind == "cancelOrder" and self.base:
-            self.cancelling, done["actionStatus"] = done, "RUNNING"
+            self.cancelling, done["actionStatus"] = [*self.cancelling, done], "RUNNING"
         elif kind != "stateRequest":
             done["actionStatus"] = "FAILED"
             if kind == "cancelOrder":
@@ -87,20 +89,26 @@ class Vehicle:
     def go_on(self, place: Point, driving: bool) -> Point | None:
         """Note where one is and whether one moves; where to go now, None to stand."""
         self.place, self.driving = place, driving
-        while self.base and self.cancelling is None and self._near(self.base[0][0]):
+        while self.base and not self.cancelling and self._near(self.base[0][0]):
             if len(self.base) == 1 and driving:
                 break  # it comes as near to its last node as it can
             self.last = _name(self.base.pop(0)[0])
-        if self.cancelling is not None and not driving:
-            self.cancelling["actionStatus"] = "FINISHED"
-            self.cancelling, self.cancelled, self.base = None, True, []
+        if self.cancelling and not driving:
+            for done in self.cancelling:
+                done["actionStatus"] = "FINISHED"
+            self.cancelling, self.cancelled, self.base = [], True, []
         if self.mode not in ("AUTOMATIC", "SEMIAUTOMATIC"):
             self.cancelled, self.base = True, []
         hindered = self.paused or self.violated or self.emergency != "NONE" or not self.localised
-        if hindered or self.cancelling is not None or not self.base:
+        if hindered or self.cancelling or not self.base:
             return None
         position = self.base[0][0]["nodePosition"]
         return position["x"], position["y"]
+
+    @property
+    def look(self) -> float | None:
+        """Which way it is to look at the next node; None for any."""
+        return self.base[0][0]["nodePosition"].get("theta") if self.base else None
 
     def state(self) -> Json:
         """What a vehicle says of itself, but for where it is."""
@@ -126,7 +134,12 @@ class Vehicle:
     def position(self) -> Json:
         """Where it says that it is."""
         dialect, (x, y) = self.settings.dialect, self.place
-        found: Json = {"x": round(x, 6), "y": round(y, 6), "theta": 0.0, "mapId": self.settings.map}
+        found: Json = {
+            "x": round(x, 6),
+            "y": round(y, 6),
+            "theta": self.heading,
+            "mapId": self.settings.map,
+        }
         return {dialect.position: found | {dialect.located: self.localised}}
 
     def _refusal(self, message: Json) -> Refusal | None:
@@ -141,7 +154,7 @@ class Vehicle:
         if its_own:
             if number <= self.update:
                 return None if number == self.update else "outdated"
-            if self.cancelled or self.cancelling is not None:
+            if self.cancelled or self.cancelling:
                 return "cancelled"
             return None if _name(nodes[0]) == self.end else "unstitched"
         if self.base:
@@ -152,7 +165,9 @@ class Vehicle:
         """Whether one is at a node as exactly as it wants."""
         position = node["nodePosition"]
         reach = self.settings.dialect.reach(position.get("allowedDeviationXY"))
-        return math.dist(self.place, (position["x"], position["y"])) <= reach
+        askew = math.remainder(position.get("theta", self.heading) - self.heading, math.tau)
+        turned = abs(askew) <= position.get("allowedDeviationTheta", 0.0)
+        return turned and math.dist(self.place, (position["x"], position["y"])) <= reach
 
 
 def _released(message: Json) -> list[Json]:

@@ -5,6 +5,7 @@ import time
 from .fleet import Connection
 from .poses import Poses, Track
 from .settings import WireSettings
+from .tagged import Judge, TagWatch, all_believed
 
 CALMLY = 0.02
 OFTEN = 3
@@ -18,14 +19,17 @@ def checkup(
     others: set[str],
     seconds: float,
     guard: str,
+    judge: Judge = all_believed,
 ) -> tuple[list[str], bool]:
     """What is to be told, and whether all could be driven, after listening for so many seconds.
 
     Args:
-        link: listens, and feeds the poses; is closed after.
+        link: listens, and feeds the poses where no camera does; is closed after.
         others: robots that another program was heard to drive meanwhile.
         guard: how the link is guarded, in words.
+        judge: what is believed of robots that a camera sees.
     """
+    watch = settings.camera and TagWatch(settings.camera, poses, judge)
     where = f"{settings.where[0].upper()}{settings.where[1:]}"
     try:
         ends = time.monotonic() + seconds
@@ -38,6 +42,8 @@ def checkup(
             return [f"{where} is of no use: {link.trouble}."], False
     finally:
         link.close()
+        if watch is not None:
+            watch.close()
     now = time.monotonic()
     told = [f"{where} is reachable{guard}.{poses.trouble}"]
     robots = [_robot_told(settings, poses, robot, now, begun) for robot in settings.robots]

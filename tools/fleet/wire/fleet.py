@@ -12,13 +12,14 @@ import uuid
 from abc import ABC, abstractmethod
 from collections.abc import AsyncGenerator, Callable, Mapping
 from contextlib import aclosing
+from types import MappingProxyType
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...geometry.outline import FloatArray, Outline
-from ...motion.following import Following
+from ...motion.following import EXACT, Following
 from ...motion.motion import Motion
 from ..protocol import (
     FleetBusyError,
@@ -35,6 +36,7 @@ from ..protocol import (
 from ..seen_things import Look, SeenThings
 from .poses import Poses
 from .settings import WireSettings
+from .tagged import Judge, TagWatch, all_believed
 
 WAIT = 3.0
 """Seconds for which robots are waited for that have not been seen since the broker was found."""
@@ -44,10 +46,16 @@ LEAD = 0.15
 """Robots at places that move are sent to where these will be in so many seconds."""
 SETTLED = 0.25
 """A robot has come to its end within so many px,"""
-CALM = 0.5
-"""or when it has stood, within its tracking error of it, for so many seconds."""
+TURNED = 0.02
+"""and looks within so many radians of where it is to,"""
+CALM, CALM_ASKEW = 0.5, 2.0
+"""or when it has stood, within its tracking error of it, for so many seconds; for the second where
+it has yet to turn, which it may only be about to."""
 HOLDING = 1.0
 """Seconds in which robots that were told to hold have to stand."""
+LATE, LISTENING = 0.25, 0.3
+"""A program that sends goals so many seconds late has hung; it first listens for so many: somebody
+may have stopped the robots meanwhile."""
 OTHERS = 2.0
 """Seconds after which another program that sent goals is taken to have ended."""
 MOST_TOLD = 5
@@ -80,19 +88,20 @@ class WireFleet(ABC):
     """Robots elsewhere, as a file describes them; what they are told is up to who derives from it.
 
     Attributes:
-        poses: what is believed of where they are; to be fed with what they say.
+        poses: what is believed of where they are; to be fed with what they say, where no camera
+            sees them.
         link: what connects them; to be set before the fleet is used.
         ahead: see `AHEAD`.
         look: the newest frame of the camera above the robots; None where there is none.
     """
 
-    real, turns, ahead = True, False, AHEAD
+    real, ahead = True, AHEAD
     name: str
     link: Connection
     look: Look | None = None
 
     def __init__(self, settings: WireSettings) -> None:
-        self.settings = settings
+        self.settings, self.turns = settings, settings.turns
         self.radius, self.speed = settings.pixels(settings.radius), settings.pixels(settings.speed)
         self.tracking_error = settings.pixels(settings.tracking_error)
         self.stopped, self._stops = False, 0
@@ -100,19 +109,30 @@ class WireFleet(ABC):
         self._others = -OTHERS
         self.poses = Poses(settings)
         self._things: SeenThings | None = None
+        self._tags: TagWatch | None = None
 
     @abstractmethod
-    def send(self, drive: str, seq: int, goals: Mapping[str, Point]) -> None:
+    def send(
+        self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]
+    ) -> None:
         """Tell robots, by id, a point to drive straight to, in their frame.
 
         Args:
             drive: another one in each drive; robots disregard goals of one that was held.
             seq: rises within a drive, one for each call.
+            looks: which way robots are to look where their goal is their end, radians about the x
+                axis towards the y axis of their frame; for those that are to look anywhere.
         """
 
     @abstractmethod
     def hold(self, reason: Reason) -> None:
         """Tell all robots to hold, at once; later, surely, where they cannot be told now."""
+
+    def see_tags(self, judge: Judge = all_believed) -> None:
+        """Have poses come from the camera from now on, where the file has one."""
+        if self.settings.camera is not None:
+            self._tags = TagWatch(self.settings.camera, self.poses, judge)
+            self.look = self._tags.top_view
 
     async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
         """Poses as they were seen last; robots are waited for a while when none were yet."""
@@ -130,7 +150,7 @@ class WireFleet(ABC):
         if not motion.paths:
             return
         release = Release(motion, self)
-        async with aclosing(self._steps(motion.paths, release.goals)) as steps:
+        async with aclosing(self._steps(motion.paths, release.goals, release.looks)) as steps:
             async for poses in steps:
                 yield poses
                 if release.there:
@@ -170,12 +190,14 @@ class WireFleet(ABC):
         self,
         robots: Mapping[str, object],
         goals: Callable[[tuple[Pose, ...]], Mapping[str, Point]],
+        looks: Mapping[str, float] = MappingProxyType({}),
     ) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Send robots to their goals every period, and yield the poses; at the end they hold.
 
         Args:
             robots: by id, those that are driven.
             goals: from the poses, in the robots' frame.
+            looks: as of `send`, once the goals are known.
         """
         self._driving, stops, begun = True, self._stops, False
         drive = uuid.uuid4().hex[:12]
@@ -188,11 +210,15 @@ class WireFleet(ABC):
                     moving,
                 )
             joined, due = self.link.joined, time.monotonic()
+            before = due
             for seq in itertools.count(1):
+                if time.monotonic() > before + self.settings.period + LATE:
+                    await asyncio.sleep(LISTENING)
+                before = time.monotonic()
                 poses = self.poses.seen()
                 self._check_going(robots, stops, joined)
                 begun = True
-                self.send(drive, seq, goals(poses))
+                self.send(drive, seq, goals(poses), looks)
                 yield poses
                 due = max(due + self.settings.period, time.monotonic())
                 await asyncio.sleep(due - time.monotonic())
@@ -212,11 +238,13 @@ class WireFleet(ABC):
         self.stopped = False
 
     async def close(self) -> None:
-        """Hold the robots if they are driven, and let go of the broker."""
+        """Hold the robots if they are driven, and let go of what connects them, and the camera."""
         if self._driving:
             self.hold("end")
         self._closed = True
         await asyncio.to_thread(self.link.close)
+        if self._tags is not None:
+            await asyncio.to_thread(self._tags.close)
 
     def saw_others(self) -> None:
         """Note that another program has just driven these robots."""
@@ -300,6 +328,7 @@ class Release:
     """How far robots of one drive may go by now.
 
     Attributes:
+        looks: which way those are to look that are sent to their ends, in the robots' frame.
         there: whether all have come to their ends.
     """
 
@@ -311,6 +340,9 @@ class Release:
         bends = np.sin(np.minimum(self._following.turns, np.pi / 2))
         self._stops = self._following.stops(self._off_path / np.maximum(bends, 1e-9))
         self._stood, self._since = np.full_like(self._ends, np.inf), 0.0
+        looks = [motion.headings.get(robot, math.nan) for robot in self._following.ids]
+        self._wanted, self._askew = np.array(looks), np.full(len(looks), np.inf)
+        self.looks = dict[str, float]()
         self.there = False
 
     def goals(self, poses: tuple[Pose, ...]) -> dict[str, Point]:
@@ -322,20 +354,30 @@ class Release:
         points = points_of([at[robot] for robot in following.ids])
         self._progress = done = following.advance(points, self._progress, self._off_path)
         ahead = np.minimum(following.room(done, self._stops), self._fleet.ahead * self._fleet.speed)
-        places = following.at(np.minimum(following.limits(done), done + ahead))
-        self._look(points)
+        until = np.minimum(following.limits(done), done + ahead)
+        places = following.at(until)
+        self._look(points, np.array([at[robot].heading for robot in following.ids], dtype=float))
         frame = self._fleet.settings.frame
+        self.looks.clear()
+        for i in np.flatnonzero((until >= following.lengths - EXACT) & ~np.isnan(self._wanted)):
+            look = frame.turned_back(float(self._wanted[i]))
+            self.looks[following.ids[i]] = math.remainder(look, math.tau)
         spoken = [frame.to_robots(x, y) for x, y in places.tolist()]
         return dict(zip(following.ids, spoken, strict=True))
 
-    def _look(self, points: FloatArray) -> None:
+    def _look(self, points: FloatArray, headings: FloatArray) -> None:
         """Note whether robots are there, or as near as they can come."""
+        askew = np.nan_to_num(abs(np.remainder(self._wanted - headings + np.pi, math.tau) - np.pi))
         off = np.linalg.norm(points - self._ends, axis=1).max()
         now = time.monotonic()
-        if np.linalg.norm(points - self._stood, axis=1).max() > SETTLED:
-            self._stood, self._since = points, now
-        calm = now - self._since >= CALM and off <= self._fleet.tracking_error
-        self.there = bool(calm or off <= SETTLED)
+        moved = np.linalg.norm(points - self._stood, axis=1).max() > SETTLED
+        if moved or abs(askew - self._askew).max() > TURNED:
+            self._stood, self._askew, self._since = points, askew, now
+        turned = askew.max() <= TURNED
+        calm = now - self._since >= (CALM if turned else CALM_ASKEW)
+        self.there = bool(
+            (calm and off <= self._fleet.tracking_error) or (turned and off <= SETTLED)
+        )
 
 
 def _seen_moving(

@@ -99,6 +99,8 @@ class Poses:
                 self.unknown.add(robot)
             return
         track.heard += 1
+        if isinstance(said, PoseMessage) and said.heading is None and self._settings.turns:
+            said = "without a heading"
         if not isinstance(said, PoseMessage):
             self._refuse(track, said or "malformed", now)
             return

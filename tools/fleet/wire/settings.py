@@ -3,7 +3,6 @@
 Robots speak in their own frame, usually metres with y up; everything else here is image pixels.
 """
 
-import math
 from abc import ABC, abstractmethod
 from typing import Annotated, Literal, Self
 
@@ -12,53 +11,10 @@ from pydantic import Field, StringConstraints, model_validator
 from ...formation.value import Value
 from ..moving import Above0, Pixels, Seconds
 from ..physics import RobotId, Spell
+from .frame import RobotFrame
+from .tags import TagSettings
 
 MOST_ROBOTS = 1_000
-
-
-class RobotFrame(Value):
-    """How the frame that robots speak in lies in the picture; left out, they speak in pixels.
-
-    Attributes:
-        metres_per_pixel: of the picture, taken straight from above.
-        origin: (x, y) px, where the robots have (0, 0).
-        turn: degrees, clockwise in the picture, from its x axis to that of the robots.
-        y: which way the robots' y axis points in a picture, if nothing is turned.
-    """
-
-    metres_per_pixel: Above0 = 1.0
-    origin: tuple[Pixels, Pixels] = (0.0, 0.0)
-    turn: float = Field(default=0.0, ge=-360, le=360)
-    y: Literal["up", "down"] = "up"
-
-    def to_picture(self, x: float, y: float) -> tuple[float, float]:
-        """A point of the robots' frame, px."""
-        x, y = x / self.metres_per_pixel, self._side * y / self.metres_per_pixel
-        cos, sin = self._way
-        return self.origin[0] + cos * x - sin * y, self.origin[1] + sin * x + cos * y
-
-    def to_robots(self, x: float, y: float) -> tuple[float, float]:
-        """A point of the picture in the robots' frame."""
-        x, y = x - self.origin[0], y - self.origin[1]
-        cos, sin = self._way
-        along, across = cos * x + sin * y, cos * y - sin * x
-        return along * self.metres_per_pixel, self._side * across * self.metres_per_pixel
-
-    def turned(self, heading: float) -> float:
-        """A heading of the robots', about their x axis towards their y axis, in the picture."""
-        return math.radians(self.turn) + self._side * heading
-
-    def turned_back(self, heading: float) -> float:
-        """A heading in the picture as robots have it."""
-        return self._side * (heading - math.radians(self.turn))
-
-    @property
-    def _side(self) -> float:
-        return -1.0 if self.y == "up" else 1.0
-
-    @property
-    def _way(self) -> tuple[float, float]:
-        return math.cos(math.radians(self.turn)), math.sin(math.radians(self.turn))
 
 
 class StandIn(Value):
@@ -84,9 +40,11 @@ class WireSettings(Value, ABC):
         speed: greatest of a robot, per second.
         radius: of a robot.
         tracking_error: how far one that nothing pushes may come off the straight way to its goal.
+        turns: whether they turn to a heading at their goal; they have to say how they look then.
         period: seconds between goals.
         pose_timeout: robots that were not seen for so many seconds are held.
         watchdog: robots have to hold by themselves without a goal for so many seconds.
+        camera: sees where they are; left out, they say so.
         simulated: what stands in for them.
     """
 
@@ -95,9 +53,11 @@ class WireSettings(Value, ABC):
     radius: Above0
     tracking_error: Above0
     frame: RobotFrame = RobotFrame(y="down")
+    turns: bool = False
     period: float = Field(default=0.05, ge=0.01, le=1)
     pose_timeout: Annotated[Seconds, Field(gt=0, le=10)] = 0.5
     watchdog: Annotated[Seconds, Field(gt=0, le=10)] = 0.5
+    camera: TagSettings | None = None
     simulated: StandIn = StandIn()
 
     @model_validator(mode="after")
@@ -115,6 +75,17 @@ class WireSettings(Value, ABC):
         named = {spell.robot for spell in (*stand_in.stuck, *stand_in.lost)}
         if unknown := sorted(named - set(self.robots)):
             raise ValueError(f"simulated names robot {', '.join(unknown)}, which there is not")
+        return self
+
+    @model_validator(mode="after")
+    def _all_tagged(self) -> Self:
+        if self.camera is None:
+            return self
+        tags = self.camera.tags
+        if set(tags) != set(self.robots) or len(set(tags.values())) < len(tags):
+            raise ValueError("camera.tags takes every robot, and a tag of its own for each")
+        if "frame" in self.model_fields_set:
+            raise ValueError("frame is that of the camera's calibration; leave it out")
         return self
 
     def pixels(self, length: float) -> float:

@@ -8,13 +8,13 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...geometry.outline import FloatArray
-from ..physics import Physics
+from ..physics import Physics, braking_speed
 from ..simulator import PERIOD, Simulator
 from .fleet import Connection, Point
 from .settings import WireSettings
@@ -29,16 +29,37 @@ class Robot:
 
     Attributes:
         goal: px; None while it holds.
+        look: which way it is to look there, radians, clockwise in the picture; None for any.
         said: when that was, on this computer's clock.
         drive, seq: of it.
         over: drives that were held.
     """
 
     goal: Point | None = None
+    look: float | None = None
     said: float = 0.0
     drive: str = ""
     seq: int = -1
     over: set[str] = field(default_factory=set[str])
+
+
+class Turning(Simulator):
+    """Robots that keep up with places, and turn where they stand."""
+
+    def look(self, looks: Sequence[float | None]) -> None:
+        """Turn to headings from now on; None for any."""
+        self._looks = np.array(looks, dtype=float)
+
+    def _kept_up(self, places: FloatArray) -> FloatArray:
+        told = super()._kept_up(places)
+        if self._wheels:
+            radius, change = self.physics.radius, self._push * PERIOD
+            off = np.remainder(self._looks - self.headings + np.pi, math.tau) - np.pi
+            turning = (abs(told[:, 0]) <= change / 4) & ~np.isnan(off)
+            about = braking_speed(radius * abs(off[turning]), self._push, self._smoothing)
+            about = np.minimum(about, self.physics.speed / 2) * np.sign(off[turning]) / radius
+            told[turning] = np.column_stack([np.zeros(len(about)), about])
+        return told
 
 
 class StandIns(ABC):
@@ -55,7 +76,7 @@ class StandIns(ABC):
     """
 
     link: Connection
-    simulator: type[Simulator] = Simulator
+    simulator: type[Turning] = Turning
 
     def __init__(self, settings: WireSettings, told: Callable[[str], None]) -> None:
         self._settings, self._told, self.seq = settings, told, 0
@@ -70,7 +91,8 @@ class StandIns(ABC):
             lost=stand_in.lost,
         )
         n = len(self.robots)
-        looks = np.full(n, 0.0 if stand_in.drive == "differential" else math.nan)
+        has_heading = settings.turns or stand_in.drive == "differential"
+        looks = np.full(n, 0.0 if has_heading else math.nan)
         self._sim = self.simulator(settings.robots, self._starts(), looks, physics)
         self._sim.accompany(settings.robots)
         self._changes: dict[str, list[str]] = defaultdict(list)
@@ -101,6 +123,7 @@ class StandIns(ABC):
                 self._changes[f"no goal came for {limit:g} s: held"].append(name)
         here = self._sim.points.tolist()
         goals = [r.goal or at for r, at in zip(self.robots.values(), here, strict=True)]
+        self._sim.look([r.look if r.goal else None for r in self.robots.values()])
         self._sim.step(np.hstack([np.array(goals), np.zeros((len(goals), 2))]))
         self.seq += 1
         for i, name in enumerate(self.robots):
@@ -123,8 +146,18 @@ class StandIns(ABC):
                 robot.goal = None
                 self._changes["told to hold"].append(name)
 
-    def go(self, name: str, drive: str, seq: int, place: Point) -> None:
-        """A robot is told to go to a point of its frame; disregarded where that is not due."""
+    def heading(self, robot: str) -> float | None:
+        """How a robot looks, radians about the x axis towards the y axis of its frame."""
+        looks = float(self._sim.headings[[*self.robots].index(robot)])
+        if math.isnan(looks):
+            return None
+        return math.remainder(self._settings.frame.turned_back(looks), math.tau)
+
+    def go(self, name: str, drive: str, seq: int, place: Point, look: float | None = None) -> None:
+        """A robot is told to go to a point of its frame, and how to look there.
+
+        Disregarded where that is not due.
+        """
         robot = self.robots.get(name)
         if robot is None or drive in robot.over:
             return
@@ -134,6 +167,7 @@ class StandIns(ABC):
             self._changes["driving"].append(name)
         robot.drive, robot.seq, robot.said = drive, seq, time.monotonic()
         robot.goal = self._settings.frame.to_picture(*place)
+        robot.look = None if look is None else self._settings.frame.turned(look)
 
     def _starts(self) -> FloatArray:
         """Where robots stand at first, (n, 2) px."""

@@ -11,7 +11,7 @@ import yaml
 from formup.tools.errors import InputError
 from formup.tools.fleet.described import described_as, fleet_named, schema
 from formup.tools.fleet.mqtt.settings import MqttSettings
-from formup.tools.fleet.wire.settings import RobotFrame
+from formup.tools.fleet.wire.frame import RobotFrame
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,6 @@
 """Who may listen and speak, what robots obey, and what a look at them tells."""
 
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,26 +9,10 @@ from typing import Any
 import pytest
 from formup.tools.errors import InputError
 from formup.tools.fleet.mqtt.checkup import checked
+from outside import driven
 
 Labs = Callable[..., Any]
 Brokers = Callable[..., Any]
-DRIVE = """
-import asyncio, sys
-from pathlib import Path
-import numpy as np
-from formup.tools.fleet.described import described_as
-from formup.tools.fleet.mqtt.fleet import MqttFleet
-from formup.tools.fleet.mqtt.settings import MqttSettings
-from formup.tools.fleet.protocol import Motion
-
-async def go():
-    fleet = MqttFleet(described_as(MqttSettings, Path(sys.argv[1])))
-    ways = {p.id: np.array([(p.x, p.y), (p.x + 5000, p.y)]) for p in await fleet.observe()}
-    async for _ in fleet.drive(Motion(ways)):
-        print("driving", flush=True)
-
-asyncio.run(go())
-"""
 
 
 def told(found: tuple[list[str], bool]) -> str:
@@ -45,10 +28,7 @@ def until(what: Callable[[], bool], seconds: float = 10.0) -> None:
 
 def test_robots_hold_when_the_process_that_drives_them_is_killed(lab: Labs) -> None:
     there = lab(watchdog=10).simulate()
-    command = [sys.executable, "-c", DRIVE, str(there.path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as driver:
-        assert driver.stdout is not None
-        assert driver.stdout.readline() == b"driving\n"
+    with driven(there.path) as driver:
         until(lambda: there.was_told("driving"))
         driver.kill()
     until(lambda: there.was_told("told to hold: a, b, c"))  # the last will; the watchdog is slow

@@ -71,7 +71,8 @@ class Lab(Simulated[Faulty]):
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             port: int = free.getsockname()[1]
-        super().__init__(path, {**USUAL, "bridge": f"ws://127.0.0.1:{port}", **more})
+        given = {**USUAL, "bridge": f"ws://127.0.0.1:{port}", **more}
+        super().__init__(path, {key: what for key, what in given.items() if what is not None})
         self.settings: RosSettings = described_as(RosSettings, path)
         self._speaking: threading.Thread | None = None
 

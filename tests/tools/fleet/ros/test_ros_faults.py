@@ -2,8 +2,6 @@
 
 import asyncio
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import aclosing
@@ -20,27 +18,11 @@ from formup.tools.fleet.protocol import (
     StalePosesError,
 )
 from formup.tools.fleet.wire import fleet as fleet_module
+from outside import driven
 
 Labs = Callable[..., Any]
 Said = dict[str, Any]
 MODES = ["pose", "cmd_vel", "nav2"]
-DRIVE = """
-import asyncio, sys
-from pathlib import Path
-import numpy as np
-from formup.tools.fleet.described import described_as
-from formup.tools.fleet.ros.fleet import RosFleet
-from formup.tools.fleet.ros.settings import RosSettings
-from formup.tools.fleet.protocol import Motion
-
-async def go():
-    fleet = RosFleet(described_as(RosSettings, Path(sys.argv[1])))
-    ways = {p.id: np.array([(p.x, p.y), (p.x + 5000, p.y)]) for p in await fleet.observe()}
-    async for _ in fleet.drive(Motion(ways)):
-        print("driving", flush=True)
-
-asyncio.run(go())
-"""
 
 
 def fault(of: Callable[[Said, int], Said | None]) -> Act:
@@ -197,10 +179,7 @@ def test_robots_hold_by_themselves_when_the_process_that_drives_them_is_killed(
     lab: Labs, by: str
 ) -> None:
     there = lab(drive_by=by).simulate()
-    command = [sys.executable, "-c", DRIVE, str(there.path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as driver:
-        assert driver.stdout is not None
-        assert driver.stdout.readline() == b"driving\n"
+    with driven(there.path) as driver:
         wait_for(lambda: there.was_told("driving"))
         driver.kill()
     wait_for(lambda: there.was_told("no goal came for 0.5 s: held: a, b, c"))
@@ -210,10 +189,7 @@ def test_robots_hold_by_themselves_when_the_process_that_drives_them_is_killed(
 
 def test_nav2_goes_no_further_than_its_last_goal_when_the_process_is_killed(lab: Labs) -> None:
     there = lab(drive_by="nav2").simulate()
-    command = [sys.executable, "-c", DRIVE, str(there.path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE) as driver:
-        assert driver.stdout is not None
-        assert driver.stdout.readline() == b"driving\n"
+    with driven(there.path) as driver:
         wait_for(lambda: there.was_told("driving"))
         driver.kill()
     begun = there.robots.points[:, 0].copy()

@@ -7,8 +7,8 @@ import pytest
 from formup.tools.fleet.ros.messages import goal_of, hold_of, pose_message, stamped, twist
 from formup.tools.fleet.ros.settings import RosSettings
 from formup.tools.fleet.ros.tracking import velocity
+from formup.tools.fleet.wire.frame import RobotFrame
 from formup.tools.fleet.wire.poses import MOST_REASONS, PoseMessage, Poses
-from formup.tools.fleet.wire.settings import RobotFrame
 from hypothesis import given
 from hypothesis import strategies as st
 

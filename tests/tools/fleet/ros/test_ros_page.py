@@ -17,7 +17,7 @@ COMMANDS = commands_of(PAGE)
 def test_the_page_gets_from_nothing_to_a_formation(tmp_path: Path) -> None:
     pytest.importorskip("websockets", reason="the extra ros is not installed")
     assert COMMANDS[0] == "formup fleet simulate examples/ros.yaml"
-    assert COMMANDS[-1] == "formup deploy plan/plan.json --fleet examples/ros.yaml"
+    assert COMMANDS[-1] == "formup fleet stop examples/ros.yaml"
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -25,6 +25,7 @@ def test_the_page_gets_from_nothing_to_a_formation(tmp_path: Path) -> None:
     assert "6 of 6 robots can be driven." in said["formup fleet check"]
     assert "planned:" in said["formup run docs/images/lot.jpg"]
     assert "deployed: All arrived" in said["formup deploy plan/plan.json"]
+    assert "6 robots were told to hold; all stand." in said["formup fleet stop"]
 
 
 def test_the_tables_have_the_keys_there_are() -> None:

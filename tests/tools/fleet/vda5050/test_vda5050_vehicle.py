@@ -138,6 +138,16 @@ def test_cancelling_is_done_when_it_stands_and_nothing_of_that_order_is_taken(
     assert (vehicle.go_on((0.3, 0), False), complaints(vehicle)) == ((1, 0), [])
 
 
+def test_an_order_may_be_cancelled_by_two(vehicle: Vehicle) -> None:
+    vehicle.take(order(vehicle, 0, 0, 1))
+    assert vehicle.go_on((0.2, 0), True) == (1, 0)
+    for name in "12":
+        vehicle.act(action("cancelOrder", name))
+    assert vehicle.go_on((0.3, 0), False) is None
+    field = vehicle.settings.dialect.instant
+    assert [a["actionStatus"] for a in vehicle.state()[field]] == ["FINISHED", "FINISHED"]
+
+
 def test_it_pauses_and_loses_its_order_when_a_person_takes_over(vehicle: Vehicle) -> None:
     vehicle.take(order(vehicle, 0, 0, 1))
     vehicle.act(action("startPause", "1"))

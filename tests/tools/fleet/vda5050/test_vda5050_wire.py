@@ -1,8 +1,6 @@
 """What goes over the wire: valid to the letter, a little at a time, and never after a stop."""
 
 import asyncio
-import subprocess
-import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -15,27 +13,11 @@ from formup.tools.fleet.protocol import FleetStoppedError, Motion, StalePosesErr
 from formup.tools.fleet.vda5050.checkup import checked
 from formup.tools.fleet.vda5050.messages import Writer, mistake
 from formup.tools.fleet.wire import fleet as fleet_module
+from outside import driven
 
 Halls = Callable[..., Any]
 Json = dict[str, Any]
 Fault = Callable[[str, Json], Json | None]
-DRIVE = """
-import asyncio, sys
-from pathlib import Path
-import numpy as np
-from formup.tools.fleet.described import described_as
-from formup.tools.fleet.protocol import Motion
-from formup.tools.fleet.vda5050.fleet import Vda5050Fleet
-from formup.tools.fleet.vda5050.settings import Vda5050Settings
-
-async def go():
-    fleet = Vda5050Fleet(described_as(Vda5050Settings, Path(sys.argv[1])))
-    ways = {p.id: np.array([(p.x, p.y), (p.x + 5000, p.y)]) for p in await fleet.observe()}
-    async for poses in fleet.drive(Motion(ways)):
-        print(poses[0].x, flush=True)
-
-asyncio.run(go())
-"""
 
 
 def until(what: Callable[[], object], seconds: float = 10.0) -> None:
@@ -169,9 +151,7 @@ def test_vehicles_end_at_the_last_node_when_the_process_that_drives_them_is_kill
     hall: Halls,
 ) -> None:
     there = hall().simulate()
-    command = [sys.executable, "-c", DRIVE, str(there.path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as driver:
-        assert driver.stdout is not None
+    with driven(there.path) as driver:
         until(lambda: float(driver.stdout.readline()) > 100)  # pyright: ignore[reportOptionalMemberAccess]
         driver.kill()
         at = there.robots.points.copy()

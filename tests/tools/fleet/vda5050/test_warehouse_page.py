@@ -15,9 +15,10 @@ COMMANDS = commands_of(PAGE)
 def test_the_page_gets_from_nothing_to_a_formation(
     tmp_path: Path, brokers: Callable[..., Any]
 ) -> None:
-    assert [command.split()[:3] for command in COMMANDS][-2:] == [
+    assert [command.split()[:3] for command in COMMANDS][-3:] == [
         ["formup", "run", "docs/images/lot.jpg"],
         ["formup", "deploy", "plan/plan.json"],
+        ["formup", "fleet", "stop"],
     ]
     broker = brokers()
     broker.kill()
@@ -26,6 +27,7 @@ def test_the_page_gets_from_nothing_to_a_formation(
     assert "6 of 6 robots can be driven." in said["formup fleet check"]
     assert "planned:" in said["formup run docs/images/lot.jpg"]
     assert "deployed: All arrived" in said["formup deploy plan/plan.json"]
+    assert "6 robots were told to hold; all stand." in said["formup fleet stop"]
 
 
 def test_the_table_has_the_keys_there_are() -> None:
