@@ -66,6 +66,7 @@ check: .venv/.ready-dev
 
 # The site in build/site, which needs no server: open build/site/index.html.
 docs: .venv/docs/.ready
+	@rm -rf build/site
 	.venv/docs/bin/sphinx-build -q -E -W --keep-going -d build/doctrees -c docs/site . build/site
 
 .venv/docs/.ready: pyproject.toml constraints.txt

@@ -69,8 +69,9 @@ def tools() -> str:
     parts = [
         "# Tools that models see\n",
         "What a model is offered, over MCP too. A tool's kind says what it may do: `read` finds "
-        "things out, `commit` makes a plan, `actuate` moves robots, `ask` and `end` end the turn. `formup "
-        "tools schema NAME` prints the schema of its arguments, `formup tools call` calls it.\n",
+        "things out, `commit` makes a plan, `actuate` moves robots, `ask` and `end` end the turn. "
+        "`formup tools schema NAME` prints the schema of its arguments, `formup tools call` calls "
+        "it.\n",
     ]
     for tool in TOOLS:
         known = dict(tool.schema["properties"])
@@ -90,8 +91,9 @@ def fleet() -> str:
     parts = [
         "# Fleet files\n",
         "Keys of the YAML file that `--fleet` names, by its `fleet`: "
-        "[simulated](../command-line.md), [MQTT](../fleets.md), [ROS 2](../ros.md), [VDA 5050](../warehouse.md) or poses that were "
-        f"recorded. `formup tools schema fleet` prints the {schema_file('fleet')}.\n",
+        "[simulated](../command-line.md), [MQTT](../fleets.md), [ROS 2](../ros.md), "
+        "[VDA 5050](../warehouse.md) or poses that were recorded. `formup tools schema fleet` "
+        f"prints the {schema_file('fleet')}.\n",
     ]
     for kind in schema["oneOf"]:
         name = kind["properties"]["fleet"]["const"]

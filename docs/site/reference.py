@@ -1,8 +1,9 @@
 """The pages of the reference: which there are, what the Python ones have, and their files."""
 
 import inspect
+import re
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -54,11 +55,11 @@ FACE = {
 def write(folder: Path) -> None:
     """Write every page anew."""
     made = {
-        "python.md": python_face(),
-        "extending.md": python_modules(),
         "tools.md": tools(),
         "http.md": http(),
         "fleet.md": fleet(),
+        **python_face(),
+        **python_modules(),
         **commands(),
         **schemas(),
     }
@@ -77,37 +78,60 @@ def autodoc(directive: str, name: str, without: Iterable[str] = ()) -> str:
     return "```{eval-rst}\n" + "\n".join(lines) + "\n```\n"
 
 
-def python_face() -> str:
-    """What `import formup` gives."""
-    parts = [
-        "# Python\n",
-        "What `import formup` gives. [From Python](../python.md) shows it at work.\n",
-    ]
+def python_face() -> dict[str, str]:
+    """What `import formup` gives, a page for each of its groups."""
     groups = {title: names.split() for title, names in FACE.items()}
-    grouped = {name for names in groups.values() for name in names}
-    groups["More"] = [name for name in formup.__all__ if name not in grouped | {"TOOLS"}]
+    grouped = {name for names in groups.values() for name in names} | {"TOOLS"}
+    groups["More"] = [name for name in formup.__all__ if name not in grouped]
+    pages: dict[str, list[str]] = {}
     for title, names in groups.items():
-        parts += [f"## {title}\n"] if names else []
-        for name in names:
-            found = getattr(formup, name)
-            kind = "autofunction" if inspect.isfunction(found) else "autoclass"
-            parts.append(autodoc(kind, f"formup.{name}"))
-    parts.append(
-        "## Built-in tools\n\n```{py:data} formup.TOOLS\nThe [tools](tools.md) that come with "
-        "formup; `Agent(tools=(*TOOLS, yours))` adds one.\n```\n"
+        kinds = {n: inspect.isfunction(getattr(formup, n)) for n in names}
+        pages[title] = [
+            autodoc("autofunction" if function else "autoclass", f"formup.{name}")
+            for name, function in kinds.items()
+        ]
+    pages["Tools"].append(
+        "```{py:data} formup.TOOLS\nThe [tools](../tools.md) that come with formup; "
+        "`Agent(tools=(*TOOLS, yours))` adds one.\n```\n"
     )
-    return "\n".join(parts)
+    about = "What `import formup` gives. [From Python](../python.md) shows it at work."
+    return chapters("python", "Python", about, pages)
 
 
-def python_modules() -> str:
+def python_modules() -> dict[str, str]:
     """Protocols to implement and functions beside the public face."""
-    parts = ["# Python, to extend it\n", "What models, stores, fleets and detectors implement.\n"]
-    for title, names in MODULES.items():
-        parts.append(f"## {title}\n")
-        for name in names:
-            parts.append(f"### formup.{name}\n")
-            parts.append(autodoc("automodule", f"formup.{name}", formup.__all__))
-    return "\n".join(parts)
+    pages = {
+        title: [
+            part
+            for name in names
+            for part in (
+                f"## formup.{name}\n",
+                autodoc("automodule", f"formup.{name}", formup.__all__),
+            )
+        ]
+        for title, names in MODULES.items()
+    }
+    about = "What models, stores, fleets and detectors implement, and what helps with it."
+    return chapters("extending", "Python, to extend it", about, pages)
+
+
+def chapters(
+    folder: str, title: str, about: str, pages: Mapping[str, Sequence[str]]
+) -> dict[str, str]:
+    """Pages in a folder, and one that leads to them; those that would be empty are left out."""
+    made = {
+        f"{folder}/{slug(name)}.md": "\n".join([f"# {name}\n", *parts])
+        for name, parts in pages.items()
+        if parts
+    }
+    entries = "\n".join(name.removesuffix(".md") for name in made)
+    tree = f"```{{toctree}}\n:maxdepth: 1\n\n{entries}\n```\n"
+    return {**made, f"{folder}.md": f"# {title}\n\n{about}\n\n{tree}"}
+
+
+def slug(title: str) -> str:
+    """A title as the name of a file."""
+    return "-".join(re.findall(r"\w+", title.lower()))
 
 
 def sign(_app: Sphinx, what: str, _name: str, found: Any, *_: Any) -> tuple[str, str] | None:
