@@ -68,6 +68,7 @@ check: .venv/.ready-dev
 docs: .venv/docs/.ready
 	@rm -rf build/site
 	.venv/docs/bin/sphinx-build -q -E -W --keep-going -d build/doctrees -c docs/site . build/site
+	@echo build/site/index.html
 
 .venv/docs/.ready: pyproject.toml constraints.txt
 	@$(call environment,$(@D),-c constraints.txt -e '.[docs]')

@@ -109,7 +109,7 @@ def test_the_reference_has_all_there_is(links: dict[Path, Links], site: Path) ->
     tools = (reference / "tools.html").read_text("utf-8")
     assert [tool.name for tool in TOOLS if f"<h2>{tool.name}<" not in tools] == []
     http = (reference / "http.html").read_text("utf-8")
-    paths = {route.path for part in PARTS for route in part.router.routes if shown(route)}
+    paths = {route.path_format for part in PARTS for route in part.router.routes if shown(route)}
     assert {path for path in paths if f" {path}<" not in http} == set()
     assert "/api/sessions" in paths
     whole: Any = get_command(app)

@@ -1,6 +1,6 @@
-"""How Sphinx builds the site: the pages as they are, in the order in which docs/README.md has them.
+"""Sphinx's configuration: the pages as they are, in the order in which docs/README.md lists them.
 
-The source folder is the repository's root, so that a link works here as it does in a checkout.
+The source folder is the repository's root, so that links work here as they do in a checkout.
 """
 
 import re
@@ -24,7 +24,7 @@ include_patterns = [
     *("*.md", "docs/*.md", "docs/reference/**.md", "examples/*.md"),
     *("evals/photos/*.md", "vendor/vda5050/*.md"),
 ]
-# What is left out is not looked through either: .venv holds a link to the root.
+# Sphinx follows links, and .venv holds one to the root: it must not be searched.
 exclude_patterns = [
     folder.name
     for folder in ROOT.iterdir()
@@ -52,7 +52,7 @@ html_show_sourcelink = html_copy_source = html_show_copyright = False
 
 SECTION = re.compile(r"^## (.+)$", re.MULTILINE)
 ENTRY = re.compile(r"^- \[([^]]+)\]\(([^)#:]+)\.md\)", re.MULTILINE)
-LINK = re.compile(r"\[([^]]+)\]\(([^)#:]+)\)")
+LINK = re.compile(r"\[([^]]+)\]\(([^)#:\s]+)\)")
 MENDED = {
     '<aside class="sidebar-drawer">': '<aside class="sidebar-drawer" aria-label="All pages">',
     '<aside class="toc-drawer': '<aside aria-label="On this page" class="toc-drawer',
@@ -61,11 +61,11 @@ MENDED = {
     '<th class="head"><p></p></th>': "<td></td>",
     '<div id="search-results">': '<h1>Search</h1>\n<div class="found" id="search-results">',
 }
-"""What the theme leaves unsaid to those who cannot see the page, and what says it."""
+"""Replacements in the HTML of the theme, which lacks some of what screen readers need."""
 SIGNATURE = re.compile(r"<dl>\n(<dd><em class=\"sig-param\">.*?)</dl>", re.DOTALL)
-"""Parameters a line each, as a list of definitions that defines nothing."""
+"""A signature with a line for each parameter: a list of definitions without terms."""
 DASH = re.compile(r"(<p>(?:<[^>]*>)*[\w.]+(?:</[^>]*>)*(?: \(.*\))?) -- ")
-"""Between a parameter and what it is."""
+"""The two hyphens between a parameter and its description."""
 FORWARD = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -77,13 +77,13 @@ FORWARD = """<!doctype html>
 
 
 def toctree(options: str, entries: list[tuple[str, str]]) -> str:
-    """Links as Sphinx's navigation takes them."""
+    """A directive that adds pages, as (title, path), to the navigation."""
     lines = "\n".join(f"{words} <{target}>" for words, target in entries)
     return f"```{{toctree}}\n{options}\n\n{lines}\n```\n\n"
 
 
 def navigation(text: str) -> str:
-    """The index with a toctree in each section, made of the links in that section's lists."""
+    """The index with a toctree in each section, of the links in that section's lists."""
     before, *parts = SECTION.split(text)
     for title, body in zip(parts[::2], parts[1::2], strict=True):
         before += f"## {title}{body.rstrip()}\n\n"
@@ -94,7 +94,7 @@ def navigation(text: str) -> str:
 
 
 def read_source(app: Sphinx, name: str, source: list[str]) -> None:
-    """Add the navigation to the index; a link to a folder has no page to lead to."""
+    """Add the navigation to the index, and make plain text of links to folders."""
     here = Path(app.env.doc2path(name)).parent
     source[0] = LINK.sub(lambda m: m[1] if (here / m[2]).is_dir() else m[0], source[0])
     if name == root_doc:
@@ -102,7 +102,7 @@ def read_source(app: Sphinx, name: str, source: list[str]) -> None:
 
 
 def finish(app: Sphinx, error: Exception | None) -> None:
-    """Mend the pages that were written, and have a folder that is served open at the index."""
+    """Correct the HTML, and write the index.html that forwards to the index."""
     for page in Path(app.outdir).rglob("*.html"):
         text = page.read_text(encoding="utf-8")
         for old, new in MENDED.items():
@@ -113,7 +113,7 @@ def finish(app: Sphinx, error: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Have the reference written before pages are looked for."""
+    """Write the reference, which Sphinx then finds beside the other pages."""
     reference.write(ROOT / "docs/reference")
     app.connect("autodoc-process-signature", reference.sign)
     app.connect("autodoc-process-docstring", reference.read_docstring)

@@ -1,4 +1,4 @@
-"""The pages of the reference: which there are, what the Python ones have, and their files."""
+"""The reference: its pages, those on Python among them, and how docstrings are read."""
 
 import inspect
 import re
@@ -23,7 +23,7 @@ PAGES = [
     ("HTTP", "reference/http"),
     ("Fleet files", "reference/fleet"),
 ]
-"""What a reader sees in the navigation, and the page without its suffix."""
+"""Titles in the navigation, and the pages without their suffix."""
 
 MODULES = {
     "Models": ("agent.model", "agent.providers.registry"),
@@ -37,7 +37,7 @@ MODULES = {
     "Edits": ("tools.formation.editing.edits", "tools.formation.editing.edit_kinds"),
     "Errors": ("tools.errors",),
 }
-"""What who extends formup implements or calls, beside the public face."""
+"""Modules that an extension implements or calls, beside what `import formup` gives."""
 
 FACE = {
     "Agents and conversations": "Agent Service Run load_run store_at is_stop Limits Policy Report",
