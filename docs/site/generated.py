@@ -1,6 +1,7 @@
 """Pages of the reference for commands, tools, HTTP and fleet files, as Markdown."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
@@ -46,10 +47,15 @@ def command(name: str, found: Any) -> str:
     context = typer.Context(found, info_name=name)
     usage = found.get_usage(context).removeprefix("Usage: ")
     records = [found.get_help_record(context) for found in found.params]
-    rows = [[code(left), prose(right)] for left, right in filter(None, records)]
-    about = "\n\n".join(prose(part) for part in (found.help or "").split("\n\n"))
+    rows = [[code(left), with_options(right)] for left, right in filter(None, records)]
+    about = "\n\n".join(with_options(part) for part in (found.help or "").split("\n\n"))
     shown = table(("argument or option", "meaning"), rows)
     return f"## {name}\n\n{about}\n\n```text\n{usage}\n```\n\n{shown}"
+
+
+def with_options(text: str) -> str:
+    """Text in which the names of options are code."""
+    return prose(re.sub(r"(?<!\S)--[a-z][a-z-]*", r"`\g<0>`", text))
 
 
 def schemas() -> dict[str, str]:
