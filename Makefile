@@ -11,7 +11,7 @@ TORCH := torch==2.13.0+cpu
 TORCH_INDEX := https://download.pytorch.org/whl/cpu
 WITH_TORCH := -c constraints.txt -e '.[torch,rl]' '$(TORCH)' hypothesis pytest
 
-.PHONY: wordings demo test test-servers test-torch check bench bench-evals bench-loop clean
+.PHONY: wordings demo docs test test-servers test-torch check bench bench-evals bench-loop clean
 
 demo: .venv/.ready
 	@$(BIN)/formup demo
@@ -53,6 +53,16 @@ check: .venv/.ready-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest -q tests/test_architecture.py
+
+# The site in build/site, which needs no server: open build/site/index.html.
+docs: .venv/docs/.ready
+	@rm -rf build/site
+	.venv/docs/bin/sphinx-build -q -E -W --keep-going -d build/doctrees -c docs/site . build/site
+	@echo build/site/index.html
+
+.venv/docs/.ready: pyproject.toml constraints.txt
+	@$(call environment,$(@D),-c constraints.txt -e '.[docs]')
+	@touch $@
 
 # Train the model that reads instructions, and judge it leaving one author out at a time.
 wordings: .venv/.ready-dev
