@@ -9,7 +9,7 @@ import sys
 from io import BytesIO
 from pathlib import Path
 
-from formup import Agent, Picture, Run, Settings, picture_from_bytes
+from formup import Agent, FormupError, Picture, Run, Settings, picture_from_bytes
 from PIL import Image, ImageDraw
 
 FLEET = Path(__file__).parent / "warehouse.yaml"
@@ -48,8 +48,8 @@ def main(fleet: str = str(FLEET), picture: str = "warehouse.jpg") -> None:
     stops: list[Run] = []
     for colour in PALLETS:
         planned = session.say(f"Surround the {colour} pallet with 6 robots, 2 m from it")
-        print(planned.report.message)  # noqa: T201
         if planned.report.status == "planned":
+            print(planned.report.message)  # noqa: T201
             session.say("go")  # waits, as these vehicles count as real
             planned = session.say(input(f"Drive to the {colour} pallet? "))
         report = planned.report
@@ -62,4 +62,7 @@ def main(fleet: str = str(FLEET), picture: str = "warehouse.jpg") -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        main(*sys.argv[1:])
+    except FormupError as problem:
+        sys.exit(str(problem))
