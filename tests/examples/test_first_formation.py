@@ -17,6 +17,7 @@ def test_the_notebook_gets_from_a_photograph_to_a_formation(tmp_path: Path) -> N
     pytest.importorskip("ipykernel", reason=reason)
     notebook: Any = import_module("nbformat").read(NOTEBOOK, as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells)
+    assert sum(len(cell.source.splitlines()) for cell in notebook.cells) < 100
     (tmp_path / "evals").symlink_to(ROOT / "evals")
     (tmp_path / "examples").mkdir()
     where = {"metadata": {"path": str(tmp_path / "examples")}}
