@@ -42,7 +42,7 @@ def arguments_of(command: str, installed: Path) -> list[str]:
 @pytest.mark.parametrize("name", ["own-fleet.md", "own-segmenter.md", "own-suite.md"])
 def test_the_page_works_from_its_first_command_to_its_last(name: str, tmp_path: Path) -> None:
     page = (ROOT / "docs" / name).read_text("utf-8")
-    for folder in ("evals", "tests"):
+    for folder in ("evals", "examples"):
         (tmp_path / folder).symlink_to(ROOT / folder)
     for file, text in FILE.findall(page):
         (tmp_path / file).parent.mkdir(exist_ok=True)

@@ -208,7 +208,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     for name, text in facts.items():
         (packages / "carts-1.dist-info" / name).write_text(text)
-    example = ROOT / "tests/packages/formup_example_fleet/formup_example_fleet.py"
+    example = ROOT / "examples/formup_example_fleet/formup_example_fleet.py"
     (packages / example.name).write_bytes(example.read_bytes())
     (packages / "slow_carts.py").write_text(FLEET.format(path=folder / "seen.txt"))
     return folder

@@ -22,9 +22,6 @@ def read(words: str, robots: int | None = None) -> tuple[Reading, str | None]:
     return reading, question_of(Task(words, robots, (), targets, True, SCALE), reading, count)
 
 
-PROOF = {"closure": "escape-proof"}
-
-
 @pytest.mark.parametrize(
     ("words", "relation"),
     [
@@ -246,12 +243,6 @@ def test_how_large_the_robots_are(words: str, radius: float) -> None:
         ("Cage it with 9 robots", "cage", {}),
         ("Cage it with 9 robots, leaving one exit", "around", {"opening": 0}),
         ("Put 4 robots between the vans as a divider", "between", {"layout": "divider"}),
-        ("Pen the goat in with 9 robots so it can never get out", "cage", PROOF),
-        ("Ring the drain with 9 robots, nothing may slip through between them", "cage", PROOF),
-        ("9 robots round the crab so that it has no way to escape", "cage", PROOF),
-        ("9 robots round the crab so nobody gets at it", "cage", {}),
-        ("9 robots round the tent such that they hug it", "around", {"fit": "tight"}),
-        ("9 robots round the tent so that they stay well away from it", "around", {"fit": "wide"}),
     ],
 )
 def test_what_else_is_demanded(words: str, relation: str, fields: dict[str, Any]) -> None:

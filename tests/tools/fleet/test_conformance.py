@@ -15,7 +15,7 @@ from formup.tools.fleet.protocol import FleetRequest, FleetStoppedError, Motion,
 from formup.tools.fleet.registry import FLEETS
 from formup.tools.fleet.simulated import SimulatedFleet
 
-PACKAGE = Path(__file__).parents[2] / "packages/formup_example_fleet"
+PACKAGE = Path(__file__).parents[3] / "examples/formup_example_fleet"
 REQUEST = FleetRequest((640.0, 480.0), 3)
 Poses = tuple[Pose, ...]
 

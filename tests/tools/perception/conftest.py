@@ -1,4 +1,4 @@
-"""The package of somebody else's that adds a segmenter and a detector, installed for the tests."""
+"""The package among the examples that adds a segmenter and a detector, installed for the tests."""
 
 import importlib
 import shutil
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-PACKAGE = Path(__file__).parents[2] / "packages" / "formup_example_segmenter"
+PACKAGE = Path(__file__).parents[3] / "examples/formup_example_segmenter"
 
 
 @pytest.fixture(scope="session")

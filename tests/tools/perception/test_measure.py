@@ -104,8 +104,15 @@ def test_an_installed_detector_finds_candidates_that_any_segmenter_measures(lamp
     assert by_box.confidence == pytest.approx((np.pi / 4 + 0.8) / 2, abs=0.02)
 
 
-@pytest.mark.usefixtures("example_package")
-def test_an_entry_point_that_leads_nowhere_is_one_sentence() -> None:
+def test_an_entry_point_that_leads_nowhere_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    facts = tmp_path / "absent-1.dist-info"
+    facts.mkdir()
+    (facts / "METADATA").write_text("Metadata-Version: 2.1\nName: absent\nVersion: 1\n")
+    entry = "[formup.segmenters]\nexample-absent = json:NotThere\n"
+    (facts / "entry_points.txt").write_text(entry)
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=r"'example-absent' .* cannot be imported"):
         segmenter_named("example-absent")
 

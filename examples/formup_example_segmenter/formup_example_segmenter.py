@@ -1,4 +1,4 @@
-"""Somebody else's package: a segmenter and a detector that formup finds by entry points."""
+"""A segmenter and a detector in a package of their own, which formup finds by entry points."""
 
 from typing import ClassVar
 
@@ -20,6 +20,7 @@ class EllipseSegmenter:
     thresholds: ClassVar[dict[str, float]] = {"box": 0.5, "candidate": 0.5}
 
     def segment(self, pixels: Pixels, prompt: TargetPrompt) -> Segmentation:
+        """The mask, and how far it can be trusted."""
         assert prompt.box is not None
         x0, y0, x1, y1 = prompt.box
         y, x = np.indices(pixels.shape[:2])
@@ -34,12 +35,14 @@ class BrightDetector:
     name = "example-bright"
 
     def detect(self, picture: Picture) -> tuple[Candidate, ...]:
+        """What stands out, for words that describe its look."""
         bright = picture.pixels.min(axis=2) > 200
         if not bright.any():
             return ()
         return (candidate_of("c1", outline_of_mask(bright), picture, 0.8),)
 
     def find(self, pixels: Pixels, phrase: str) -> tuple[Detection, ...]:
+        """The things that a noun names."""
         y, x = np.nonzero(pixels.min(axis=2) > 200)
         if phrase != "lamp" or not len(x):
             return ()

@@ -1,4 +1,4 @@
-"""A fleet as somebody else would write it: two carts that a task moves in real time."""
+"""A fleet in a package of its own: two carts that a task moves in real time."""
 
 import asyncio
 import time
@@ -36,6 +36,7 @@ class Carts:
         self._closed = False
 
     async def observe(self, *, max_age: float | None = None) -> tuple[Pose, ...]:
+        """Where the carts are seen now."""
         if self._closed:
             raise FleetClosedError("The carts were let go of.")
         now = time.monotonic()
@@ -44,6 +45,7 @@ class Carts:
         return poses
 
     async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
+        """Drive along the paths, and yield the poses on the way."""
         await self.observe()
         if self.stopped:
             raise FleetStoppedError("The carts are stopped.")
@@ -64,13 +66,16 @@ class Carts:
             self._hold()
 
     async def stop(self) -> None:
+        """Hold the carts until they are released."""
         self.stopped = True
         self._hold()
 
     async def release(self) -> None:
+        """Let them be driven again."""
         self.stopped = False
 
     async def close(self) -> None:
+        """Hold the carts and let go of them."""
         self._closed = True
         self._hold()
 
@@ -90,4 +95,5 @@ class Carts:
 
 
 def open_fleet(request: FleetRequest) -> Carts:
+    """What the entry point names: a fleet for a picture of this size."""
     return Carts(request.size[0])
