@@ -9,6 +9,7 @@ import typer
 from ..evals.perception.samples import MODES, Mode, measured, peak_memory
 from ..evals.perception.tables import Row, markdown, row
 from ..tools.errors import InputError
+from ..tools.perception.segmenters.protocol import Segmenter
 from ..tools.perception.segmenters.registry import segmenter_named
 from .terminal import say
 
@@ -34,7 +35,7 @@ def perception(
     """
     chosen = segmenter_named(segmenter)
     rows: list[Row] = []
-    for way in _modes(mode):
+    for way in _modes(mode, chosen, segmenter):
         for suite in suites or ["photos", "photos-added"]:
             rows.append(row(segmenter, way, suite, list(measured(suite, way, chosen))))
     if json_:
@@ -45,9 +46,20 @@ def perception(
         say(f"\nPeak memory: {peak_memory():.0f} MiB.")
 
 
-def _modes(given: list[str] | None) -> list[Mode]:
-    known: list[Mode] = [m for m in MODES if given is None or m in given]
+def _modes(given: list[str] | None, segmenter: Segmenter, name: str) -> list[Mode]:
+    """Return the modes asked for, or all that a segmenter takes.
+
+    Raises:
+        InputError: one is unknown, or the segmenter does not take it.
+    """
     wrong = set(given or ()) - set(MODES)
     if wrong:
         raise InputError(f"Unknown mode {min(wrong)!r}. There are: {', '.join(MODES)}.")
-    return known
+    fit: list[Mode] = [m for m in MODES if {m, f"{m}s"} & segmenter.takes]
+    refused = set(given or ()) - set(fit)
+    if refused or not fit:
+        can = f"only {' and '.join(fit)}" if fit else "neither outlines, boxes nor points"
+        raise InputError(
+            f"The segmenter {name} takes {can}: leave --mode out, or name one of these."
+        )
+    return [m for m in fit if given is None or m in given]

@@ -22,18 +22,24 @@ HELP = (
     "them there, fill it instead, robot 3 a bit to the left, robot 4 leaves, undo. Ask how far "
     "robot 4 is, or whether it is closed. Nothing moves until you say go."
 )
+BEGIN = (
+    "Say what the robots should do, such as: surround the coin with 6 robots, cage the largest "
+    "coin with 10 robots, fill the pool with 6 robots, or put 5 robots in a row to the left of the "
+    "car. Point at the thing too where its look does not tell it. Nothing moves until you say go."
+)
 ROBOTS_STAY = "The robots do not move back by themselves; say go for that."
 
 
 def talk(followup: Followup, standing: Standing | None, before: History) -> str:
     """Return the answer to words that ask for no change."""
     about = followup.about if followup.kind == "talk" else ""
+    advice = BEGIN if standing is None else HELP
     if about == "help":
-        return HELP
+        return advice
     if about == "thanks":
         return "You are welcome."
     if about == "hello":
-        return f"Hello. {HELP}"
+        return f"Hello. {advice}"
     if standing is None:
         return _why(before) if about == "why" else NO_PLAN
     if about == "why":

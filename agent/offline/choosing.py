@@ -8,7 +8,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import count
+from itertools import chain, count, repeat
 from textwrap import shorten
 from typing import Any
 
@@ -24,6 +24,7 @@ MOST_ASKED = 24
 """Most candidates that one question offers: more cannot be told apart on a picture."""
 MOST_QUOTED = 200
 """Most characters of an answer that a question quotes."""
+CANDIDATE_ID = re.compile(r"c[0-9]+\b")
 POINT = "point at it, with a point, a box or a rough outline"
 
 
@@ -60,7 +61,12 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
 
 
 def _find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
-    chosen = [Found(name, "the chosen thing", ()) for name in chosen_candidates(history, needed)]
+    meant = [thing.wording for thing in things] if len(things) <= needed else []
+    labels = chain(meant, repeat("the chosen thing"))
+    chosen = [
+        Found(name, label, ())
+        for name, label in zip(chosen_candidates(history, needed), labels, strict=False)
+    ]
     if len(chosen) >= needed:
         return chosen[:needed]
     if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
@@ -356,4 +362,6 @@ def _listed(matches: Sequence[dict[str, Any]]) -> str:
 
 
 def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:].rstrip(".") + "." if text else ""
+    named = CANDIDATE_ID.match(text)  # which is written as it is
+    begin = text[:1] if named else text[:1].upper()
+    return begin + text[1:].rstrip(".") + "." if text else ""

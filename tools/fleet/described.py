@@ -94,6 +94,8 @@ def described_as(kind: type[Model], path: Path) -> Model:
     Raises:
         InputError: it cannot be read, or does not describe such; names every mistake.
     """
+    if not path.suffix and not path.exists():
+        raise InputError(f"{path} is no file; give the YAML file of a fleet (docs/fleets.md).")
     content = content_of(path, BEGIN)
     found = KINDS.get(str(content.pop("fleet", None)))
     if found is None or not issubclass(found, kind):
