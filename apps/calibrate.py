@@ -18,27 +18,31 @@ from .terminal import say
 Points = Annotated[
     list[str] | None,
     typer.Option(
-        "--point", help="PX,PY=X,Y: a pixel, and where that is on the floor in metres; repeatable."
+        "--point", help="PX,PY=X,Y: a pixel, and its position on the floor in metres; repeatable."
     ),
 ]
 KnownFile = Annotated[
     Path | None,
-    typer.Option("--known", help="YAML with points, tags or a board on the floor, and the lens."),
+    typer.Option(
+        "--known", help="YAML file with known points, tags or a board on the floor, and the lens."
+    ),
 ]
-Out = Annotated[Path, typer.Option("--out", help="The file to write, such as camera.yaml.")]
+Out = Annotated[Path, typer.Option("--out", help="File to write, such as camera.yaml.")]
 
 
 def calibrate(
     ctx: typer.Context,
     out: Out,
-    image: Annotated[Path | None, typer.Argument(help="Picture; not with --camera.")] = None,
+    image: Annotated[
+        Path | None, typer.Argument(help="Picture of the floor; omit with --camera.")
+    ] = None,
     camera: o.Camera = None,
     point: Points = None,
     known: KnownFile = None,
 ) -> None:
-    """Find out where on the floor a camera's pixels are; writes a file for --calibration.
+    """Find where on the floor a camera's pixels lie, for --calibration.
 
-    A picture of the floor as it is seen by that file is written beside it.
+    Writes the calibration file and, beside it, the picture rectified to a top view of the floor.
     """
     if (known is None) == (not point):
         raise InputError("Give what is known of the floor: --known FILE, or four or more --point.")

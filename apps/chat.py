@@ -87,7 +87,10 @@ def chat(
     clearance: o.Clearance = None,
     seed: o.Seed = "0",
 ) -> None:
-    """Talk to the team: what it shall do, changes, questions; /help says what else."""
+    """Chat with the team: instructions, changes, questions, undo.
+
+    In the chat, /help lists the commands.
+    """
     picture = picture_given(ctx.params)
     settings = settings_given(ctx.params, picture)
     things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))

@@ -44,7 +44,7 @@ def deploy(
     speed: o.FollowSpeed = None,
     trajectories: o.TrajectoryFile = None,
 ) -> None:
-    """Move robots to a certified plan; naming the file is the approval."""
+    """Move robots to a certified plan; naming the file approves it."""
     if speed is not None and follow is None:
         raise InputError("--follow-speed says how fast robots may --follow; say for how long.")
     leave = None if follow is None else Follow(seconds=follow, speed=speed)

@@ -56,18 +56,24 @@ def _command(concluded: Callable[[Comparison], int]) -> Callable[..., None]:
 
 @_command
 def compare(made: Comparison) -> int:
-    """Whether B is better or worse than A, whether it may replace A, and what would settle that."""
+    """Compare two versions: is B better or worse, may it replace A?
+
+    Where that is open, says how many tasks or trials would settle it.
+    """
     return 0
 
 
 @_command
 def gate(made: Comparison) -> int:
-    """The same, and whether B may replace A by the exit code: 0 pass, 1 block, 3 inconclusive."""
+    """Compare two versions, with the verdict as the exit code.
+
+    0: pass, B may replace A; 1: block; 3: inconclusive.
+    """
     return EXIT[made.verdict]
 
 
 def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
-    """Put the trials of shards together in a new folder."""
+    """Merge the trials of several shards into a new folder."""
     count = merge(shards, out)
     join_stored(shards, out)
     say(f"{count:,} trials in {out}")

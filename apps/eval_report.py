@@ -24,10 +24,11 @@ def report(
     out: e.PageFile = None,
     prompts: o.PromptsFolder = None,
 ) -> None:
-    """A run as one HTML file: counts by slice, pictures with robots and misses, transcripts.
+    """Write a run as one HTML file.
 
-    With --against, RUN is A and the other one B, side by side with their difference and that of
-    their prompts. Held-out tasks show their scores alone.
+    It has counts by slice, pictures with robots and misses, and transcripts. With --against, RUN is
+    A and the other run B, side by side with their difference and that of their prompts. Held-out
+    tasks show only their scores.
     """
     path = out or run / NAME
     sides = _sides(run, against, arm_a, arm_b)

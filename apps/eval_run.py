@@ -65,12 +65,13 @@ def run_suite(
     jobs: e.Jobs = "1",
     dry_run: e.DryRun = False,
 ) -> None:
-    """Run a suite: successes of trials by category and setup, with intervals and the chance level.
+    """Run a suite and count successes.
 
-    Several models, prompts and descriptors are run side by side. A killed run is gone on with by
-    naming its folder again. Tasks that cannot be pointed at in the mode, or have no recording
-    where one is replayed, are left out. The split test shows scores only, and each look at it is
-    written down.
+    Successes are counted by category and setup, with confidence intervals and the chance level.
+    Several models, prompts and descriptors are run side by side. To continue a killed run, give
+    its folder again with --out. Tasks that cannot be pointed at in the chosen mode, or that have
+    no recording to replay, are left out. The test split shows scores only, and each look at it is
+    recorded.
     """
     workers = inputs.whole("--jobs", jobs, least=1)
     rates = {name: n / workers for name, n in inputs.rates("--rate", rate, model or []).items()}

@@ -24,7 +24,10 @@ COLUMN = 8
 
 
 def show_trace(file: o.TraceFile) -> None:
-    """Show a session step by step: what was said and called, times, tokens, cost, pictures."""
+    """Show a run step by step.
+
+    Prints messages, tool calls, times, tokens, cost and the files of pictures.
+    """
     root = log_path(file).parent
     pictures = FolderArtefacts(root / PICTURES)
 

@@ -21,11 +21,15 @@ if TYPE_CHECKING:
 NEEDED = "formup mcp needs an extra that is not installed: pip install 'formup[mcp]'."
 LIBRARIES = ("mcp", "mcp_types", "fastapi", "uvicorn", "prometheus_client")
 Http = Annotated[
-    bool, typer.Option("--http", help="Over HTTP instead, at /mcp: the same as formup serve.")
+    bool,
+    typer.Option("--http", help="Serve over HTTP instead, at /mcp, exactly as formup serve does."),
 ]
 Pictures = Annotated[
     list[Path] | None,
-    typer.Option(metavar="DIR", help="Whose pictures may be opened; by default this folder's."),
+    typer.Option(
+        metavar="DIR",
+        help="Folder whose pictures may be opened; default: the current folder; repeatable.",
+    ),
 ]
 
 
@@ -43,12 +47,14 @@ def mcp(
     prompts: o.PromptsFolder = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
-    fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+    fleet: Annotated[
+        str | None, typer.Option(help="Fleet of new sessions: NAME, or a YAML FILE.")
+    ] = None,
     detector: o.DetectorName = None,
     segmenter: o.SegmenterName = None,
     threshold: o.Threshold = None,
 ) -> None:
-    """The team for a client of the Model Context Protocol, over stdio."""
+    """Serve the team to Model Context Protocol clients, over stdio."""
     try:
         from ..server.hub import Hub
         from ..server.metrics import Metrics
