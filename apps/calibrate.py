@@ -45,7 +45,9 @@ def calibrate(
     Writes the calibration file and, beside it, the picture rectified to a top view of the floor.
     """
     if (known is None) == (not point):
-        raise InputError("Give what is known of the floor: --known FILE, or four or more --point.")
+        raise InputError(
+            "Give what is known of the floor, either --known FILE or at least four --point."
+        )
     given = Known(points=tuple(map(_clicked, point or ()))) if known is None else read_known(known)
     picture = picture_given(ctx.params)
     if picture is None:
@@ -64,7 +66,7 @@ def calibrate(
         x, y, height = found.camera
         say(f"camera      above x {x:.2f} m, y {y:.2f} m, at a height of {height:.2f} m")
     if len(given.points) == 4:
-        say("note        four points fit whatever they are; a fifth would show a wrong one")
+        say("note        four points always fit exactly; a fifth would reveal a wrong one")
     say(f"written     {out}")
 
 

@@ -143,7 +143,10 @@ def resume(
     Answer its question, approve or refuse its plan, or give the next instruction.
     """
     if words is not None and (answer is not None or approve is not None):
-        raise InputError("Give what to do next, or an answer with --answer, not both.")
+        raise InputError(
+            "Give either the next instruction or an answer (--answer, --approve, --refuse), not "
+            "both."
+        )
     path = log_path(folder)
     left = load_run(path, None if image is None else load_picture(image))
     start = read_events(path)[0].data
@@ -203,6 +206,6 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
     for prompt in agent.prompts:
         if was.get(prompt.name, prompt.sha256) != prompt.sha256:
             raise InputError(
-                f"{prompt.name} is not what this run was begun with; put its text back, or run "
-                "again."
+                f"{prompt.name} has changed since this run began; restore its text, or start a "
+                "new run."
             )

@@ -39,7 +39,7 @@ def report(
 def _sides(run: Path, against: Path | None, arm_a: str | None, arm_b: str | None) -> list[Side]:
     if against is None:
         if arm_b is not None:
-            raise InputError("--arm-b goes with --against, which names the other run.")
+            raise InputError("--arm-b needs --against RUN, which names the other run.")
         rows = read_rows(run) if arm_a is None else arm_rows(run, arm_a, "--arm-a")
         if not rows:
             raise InputError(f"{run} holds no trials yet.")

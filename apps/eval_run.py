@@ -207,7 +207,9 @@ def tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -
     wanted = [known[name] for name in dict.fromkeys(names or known)]
     chosen = [task for task in wanted if all(arm.takes(task) for arm in arms)]
     if not chosen:
-        raise InputError("No task is left: none has a recording here, or is about one thing alone.")
+        raise InputError(
+            "No task is left to run: this method, model and --mode can try none of them."
+        )
     return chosen
 
 
@@ -220,7 +222,7 @@ def _render(suite: Suite, folder: Path) -> dict[str, RenderedPicture]:
 def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -> None:
     arms = sorted({trial.arm.name for trial in trials})
     count = look(folder, suite, sha256, arms)
-    text = f"formup: look {count} at the test split of {suite}, written down in {folder / LEDGER}."
+    text = f"formup: look {count} at the test split of {suite}, recorded in {folder / LEDGER}."
     say(text, error=True)
 
 

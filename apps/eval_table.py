@@ -146,7 +146,7 @@ def _folder(name: str, resume: bool) -> Path:
         return new_folder(f"table-{name}")
     found = sorted(RUNS.glob(f"table-{name}-*"))
     if not found:
-        raise InputError(f"There is no run of table {name} in {RUNS}; leave --resume out.")
+        raise InputError(f"There is no run of table {name} in {RUNS}; leave out --resume.")
     return found[-1]
 
 

@@ -58,11 +58,13 @@ def train_rl(
     known = {c.name: c for c in read_checkpoints(out)}
     other = sorted({c.robots for c in known.values()} - {size})
     if other:
-        raise InputError(f"{out} is of teams of {other[0]}, not {size}; use another folder.")
+        raise InputError(
+            f"{out} holds policies for teams of {other[0]}, not {size}; use another folder."
+        )
     try:
         from ..evals.rl.train import train
     except ImportError:
-        raise InputError("Training needs the extra: pip install 'formup[rl]'.") from None
+        raise InputError("Training needs an extra: pip install 'formup[rl]'.") from None
 
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:

@@ -138,7 +138,7 @@ def release_draft(
     errors = [f for f in _findings(library, [name]) if f.severity == "error"]
     if errors:
         found = " ".join(f.sentence for f in errors)
-        raise InputError(f"{name} is not released, for lint finds: {found}")
+        raise InputError(f"{name} is not released, because lint found errors: {found}")
     draft, verdict, sentence = library.load(name), "pass", ""
     if report is not None:
         verdict, sentence = verdict_of(report, draft)
@@ -146,7 +146,7 @@ def release_draft(
     released = release(library, name, why, _today(), tool_hashes(draft))
     say(released)
     if verdict != "pass":
-        say(f"formup: {released} is released, but not passed: {sentence}.", error=True)
+        say(f"formup: {released} is released, but has not passed: {sentence}.", error=True)
 
 
 @app.command("promote")
@@ -162,11 +162,12 @@ def promote_version(
     prompt = library.load(name)
     if force == (report is not None):
         raise InputError(
-            "A promotion takes a comparison that passed, --report FILE, or --force --why TEXT."
+            "A promotion needs either a comparison that passed, --report FILE, or --force "
+            "--why TEXT."
         )
     if report is None:
         if not why.strip():
-            raise InputError('--force takes a reason for the changelog: --why "...".')
+            raise InputError('--force needs a reason for the changelog: --why "...".')
         promote(library, prompt.name, f"forced: {why}", _today(), None)
     else:
         current = library.load(prompt.id)

@@ -37,6 +37,9 @@ Models = Annotated[
         help="Model that decides, as in formup run; repeatable, the first is the default.",
     ),
 ]
+NewFleet = Annotated[
+    str | None, typer.Option("--fleet", help="Fleet of new sessions: NAME, or a YAML FILE.")
+]
 
 
 def serve(
@@ -51,9 +54,7 @@ def serve(
     prompts: o.PromptsFolder = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
-    fleet: Annotated[
-        str | None, typer.Option(help="Fleet of new sessions: NAME, or a YAML FILE.")
-    ] = None,
+    fleet: NewFleet = None,
     detector: o.DetectorName = None,
     segmenter: o.SegmenterName = None,
     threshold: o.Threshold = None,
@@ -115,13 +116,13 @@ def check_reach(settings: "ServerSettings") -> None:
     """
     if settings.host not in LOOPBACK and settings.tokens_file is None:
         raise InputError(
-            f"On {settings.host} others can reach this server, and robots with it: make a token "
-            "with formup tokens add NAME, or listen on 127.0.0.1."
+            f"On {settings.host} others can reach this server and its robots; create a token with "
+            "formup tokens add NAME, or listen on 127.0.0.1."
         )
     if settings.tokens_file is not None and not settings.tokens_file.is_file():
         raise InputError(
-            f"There is no file of tokens {settings.tokens_file}, so that nobody could get in: make "
-            f"one with formup tokens add NAME --tokens {settings.tokens_file}."
+            f"The token file {settings.tokens_file} does not exist, so nobody could get in; create "
+            f"it with formup tokens add NAME --tokens {settings.tokens_file}."
         )
 
 
@@ -152,7 +153,7 @@ def remove(
 ) -> None:
     """Revoke a token at once; sessions made with it are kept."""
     _tokens(file).remove(name)
-    say(f"The token {name} is no longer taken.")
+    say(f"The token {name} is revoked.")
 
 
 def _tokens(file: Path | None) -> "Tokens":

@@ -55,7 +55,10 @@ def show(session: SessionId, store: o.StoreUrl = None) -> None:
     Prints messages, tool calls, times, tokens and cost.
     """
     with _at(store) as there:
-        events, how_on = there.open(session).events(), f"formup chat --session {session} goes on"
+        events, how_on = (
+            there.open(session).events(),
+            f"continue with formup chat --session {session}",
+        )
     show_events(events, lambda sha256: sha256[:16], session, how_on)
 
 
@@ -102,7 +105,7 @@ def export(session: StoredSession, folder: Path) -> str:
     export_folder(session, folder)
     written = (export_page(session, folder), export_json(session, folder))
     page, events = (path.name for path in written)
-    return f"It is in {folder}: {page} to read, {events}, and all that formup trace shows."
+    return f"Exported to {folder}: {page} to read, {events}, and the files that formup trace reads."
 
 
 def list_words(found: Sequence[SessionFacts]) -> str:

@@ -136,7 +136,5 @@ def _context(image: Path | None, state: Path | None, settings: Settings) -> Cont
         stored = read_world(state)
         return Context.of(picture_of(stored, state, given), settings, stored.world)
     if given is None:
-        raise InputError(
-            "Name the picture with --image, or a state file that has one with --state."
-        )
+        raise InputError("Give a picture with --image, or a state file that has one with --state.")
     return Context.of(given, settings)

@@ -47,9 +47,7 @@ def mcp(
     prompts: o.PromptsFolder = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
-    fleet: Annotated[
-        str | None, typer.Option(help="Fleet of new sessions: NAME, or a YAML FILE.")
-    ] = None,
+    fleet: serve.NewFleet = None,
     detector: o.DetectorName = None,
     segmenter: o.SegmenterName = None,
     threshold: o.Threshold = None,
@@ -80,7 +78,7 @@ def mcp(
     folders = [folder.resolve() for folder in pictures or [Path()]]
     for folder in folders:
         if not folder.is_dir():
-            raise InputError(f"--pictures {folder} is no folder.")
+            raise InputError(f"--pictures {folder} is not a folder; give one that exists.")
     with serve.service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
         hub = Hub(service, settings, Tokens(None), Metrics())
         raise typer.Exit(asyncio.run(_serve(hub, make_server(hub, folders).run_stdio_async())))

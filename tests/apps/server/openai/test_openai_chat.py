@@ -144,14 +144,18 @@ def image(address: str) -> dict[str, Any]:
 
 BYTES = image("data:image/png;base64,AAAA")
 REFUSED: list[tuple[list[Any], dict[str, Any], str]] = [
-    ([image("http://x.test/a.png")], {}, "given as 'http://x.test/a.png', and nothing is fetched"),
-    ([image("file:///etc/passwd")], {}, "nothing is fetched"),
-    ([image("data:image/png;base64,?")], {}, "no valid base64"),
+    (
+        [image("http://x.test/a.png")],
+        {},
+        "given as 'http://x.test/a.png', but this server fetches nothing",
+    ),
+    ([image("file:///etc/passwd")], {}, "this server fetches nothing"),
+    ([image("data:image/png;base64,?")], {}, "not valid base64"),
     ([BYTES], {}, "is not a picture of an allowed format"),
     ([BYTES, BYTES], {}, "2 pictures came"),
     ([{"type": "input_audio", "input_audio": {"data": "", "format": "wav"}}], {}, "holds 'input_a"),
     ([], {"n": 2}, "n is 2"),
-    ([], {"modalities": ["text", "audio"]}, "Audio cannot be answered with"),
+    ([], {"modalities": ["text", "audio"]}, "Audio answers are not supported"),
 ]
 
 
@@ -283,7 +287,7 @@ def test_a_failure_in_the_middle_never_passes_for_the_answer(
     with pytest.raises(APIError, match="its log says why"):
         list(openai.chat.completions.create(**body, stream=True))
     again = openai.chat.completions.create(**body).choices[0].message.content
-    assert "broken off before its end" in again
+    assert "interrupted before it was finished" in again
     body["messages"][0]["content"][0]["text"] = "Surround the largest coin with 5 robots"
     with openai.chat.completions.with_streaming_response.create(**body, stream=True) as raw:
         lines = [line for line in raw.iter_lines() if line]
@@ -315,7 +319,7 @@ def test_tokens_keep_sessions_apart(serve: Serve, chat: Any, store: Store, tmp_p
     assert "not move robots" in bobs.say("go")
     with pytest.raises(APIError, match="scope read; this needs plan"):
         chat(url, eve).say(CAGE, "us_coins.jpg")
-    assert "No robots of this chat move" in chat(url, eve).say("stop")
+    assert "No robots of this chat are moving" in chat(url, eve).say("stop")
     assert not moved(store)
     before = store.sessions()
     assert "not move robots" in chat(url, bob).say("go", "us_coins.jpg")
