@@ -20,14 +20,17 @@ from ..tools.errors import StorageError
 
 Looks = Iterator[tuple[str, str, Callable[[], object]]]
 PURPOSES = {
+    "all": "everyday use",
     "dev": "tests",
     "mcp": "MCP clients",
     "mqtt": "robots on MQTT",
     "otel": "OpenTelemetry spans",
     "postgres": "sessions in PostgreSQL",
     "ray": "evals on a Ray cluster",
+    "rl": "reinforcement learning baselines",
     "ros": "robots on ROS",
     "serve": "the HTTP server",
+    "sim": "the window of --watch",
     "torch": "neural networks",
 }
 """What each extra is for; for other extras, their packages are listed."""

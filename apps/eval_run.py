@@ -251,8 +251,8 @@ def _print_summary(
     content = {"suite": suite.name, "sha256": planned[0].suite, "arms": summary}
     write_whole(folder / SUMMARY, json.dumps(content, indent=1).encode())
     Console(highlight=False, soft_wrap=True).print(
-        "Success: k of n trials; the intervals are of these tasks alone. Right thing: it was the "
-        "one meant, of those known. Chance: the best of five policies that know where the thing is "
-        f"and nothing else.\n{folder}\n"
-        f"To look at it: formup eval report {folder}"
+        "Success: k of n trials; the intervals hold for these tasks only. Right thing: the one "
+        "that was meant, out of those known. Chance: the best of five policies that know where the "
+        f"thing is and nothing else.\n{folder}\n"
+        f"To view it: formup eval report {folder}"
     )

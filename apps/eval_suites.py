@@ -44,7 +44,7 @@ def add(folder: e.NewFolder, name: e.Name = None) -> None:
     except InputError:
         path.unlink()
         raise
-    say(f"{path}: {len(made.tasks)} tasks. Run them: formup eval run {folder}")
+    say(f"{path}: {len(made.tasks)} tasks. Run it: formup eval run {folder}")
 
 
 def descriptors(suite: e.DescribedSuite = "photos") -> None:

@@ -77,7 +77,7 @@ def train_rl(
     write_whole(out / CURVE, picture(made))
     for name in CATEGORIES:
         _print_category(name, [c for c in made if c.category == name])
-    say(f"{out / CURVE}\nTo try them: formup eval table 1 --method rl --checkpoints {out}")
+    say(f"{out / CURVE}\nTo evaluate them: formup eval table 1 --method rl --checkpoints {out}")
 
 
 def _print(made: Checkpoint) -> None:

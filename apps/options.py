@@ -74,7 +74,7 @@ ModelName = Annotated[
     typer.Option(
         "--model",
         help="Model that decides: offline (rules, no AI), openai:NAME, openai-responses:NAME, "
-        "anthropic:NAME, gemini:NAME or ollama:NAME.",
+        "anthropic:NAME, gemini:NAME, ollama:NAME or replay:FILE.",
     ),
 ]
 BaseUrl = Annotated[
