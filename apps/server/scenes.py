@@ -85,7 +85,7 @@ async def paths(
 
 @router.get("/things")
 async def things(session: str, hub: AHub, person: APerson) -> list[dict[str, Any]]:
-    """List the things that stand out in the picture; they are detected once, for turns too."""
+    """List the things that stand out in the picture; turns reuse what is detected here."""
     context = (await _session(hub, session, person)).context
     return candidate_data(await asyncio.to_thread(context.candidates))
 
