@@ -130,7 +130,7 @@ def test_arms_of_one_run_are_chosen_by_words(
     assert [printed[side]["prompt"] for side in "ab"] == ["former@v001", "former@v002"]
     assert printed["outcome"] == "better"
     for wrong in ((), ("--arm-a", "offline"), ("--arm-a", "former@v009")):
-        with pytest.raises(InputError, match=r"holds 2 arms\. .*--arm-a.*former@v001#0"):
+        with pytest.raises(InputError, match=r"holds 2 arms; .*--arm-a.*former@v001#0"):
             formup("eval", "compare", both, both, *wrong)
 
 

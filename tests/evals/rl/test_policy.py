@@ -145,5 +145,5 @@ def test_training_without_its_extra_and_with_what_it_does_not_take(
     with pytest.raises(InputError, match=r"Unknown category 'herd'. There are: general"):
         formup(*train, "--category", "herd")
     policies = write_policies(tmp_path / "policies")
-    with pytest.raises(InputError, match="holds policies for teams of 6, not 8; use another folder"):
+    with pytest.raises(InputError, match="policies for teams of 6, not 8; use another folder"):
         formup("eval", "train-rl", "--out", policies)
