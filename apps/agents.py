@@ -56,7 +56,7 @@ def agent_of(
         )
         if agent.model.name == "offline" and agent.prompt is not None:
             say(
-                "formup: the offline planner is rules and reads no prompt; "
+                "formup: the offline planner follows rules, not a prompt; "
                 f"{agent.prompt.name} is not used.",
                 error=True,
             )

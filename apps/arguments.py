@@ -104,8 +104,8 @@ def length(name: str, text: str | None, metres_per_pixel: float | None) -> float
         value = _metric(name, text, metres_per_pixel)
     if value is None or not 0 <= value <= MAX_LENGTH:
         raise InputError(
-            f"{name} {text!r} is no length; give pixels from 0 to 100000, such as 12, or a metric "
-            "length such as 1.5m or 40cm together with --metres-per-pixel."
+            f"{name} {text!r} is not a length; give pixels from 0 to 100000, such as 12, or a "
+            "metric length such as 1.5m or 40cm together with --metres-per-pixel."
         )
     return value
 
@@ -240,7 +240,7 @@ def shown(
         InputError: as `pointed`; or a file has no picture, cannot be read or does not fit it.
     """
     if files and picture is None:
-        raise InputError("--mask needs the picture that it is of; name that too.")
+        raise InputError("--mask needs the picture that it belongs to; give IMAGE or --camera too.")
     points, boxes, outlines, candidates = ways
     found: list[Things] = [(p,) for p in pointed(points, boxes, outlines, candidates)]
     for file in files or ():
@@ -344,9 +344,7 @@ def recording(path: Path | None) -> Path | None:
         InputError: its folder does not exist, or the path is itself a folder.
     """
     if path is not None and (path.is_dir() or not path.parent.is_dir()):
-        raise InputError(
-            f"--record {path} cannot be written; name a file in a folder that is there."
-        )
+        raise InputError(f"--record {path} cannot be written; name a file in an existing folder.")
     return path
 
 
@@ -386,4 +384,4 @@ def _numbers(text: str, option: str, form: str) -> list[float]:
 
 
 def _wrong(option: str, text: str, form: str) -> str:
-    return f"{option} {text!r} cannot be read; give {form} in pixels, numbers with commas between."
+    return f"{option} {text!r} cannot be read; give {form} in pixels, separated by commas."

@@ -18,30 +18,36 @@ from .terminal import say
 Points = Annotated[
     list[str] | None,
     typer.Option(
-        "--point", help="PX,PY=X,Y: a pixel, and where that is on the floor in metres; repeatable."
+        "--point", help="PX,PY=X,Y: a pixel, and its position on the floor in metres; repeatable."
     ),
 ]
 KnownFile = Annotated[
     Path | None,
-    typer.Option("--known", help="YAML with points, tags or a board on the floor, and the lens."),
+    typer.Option(
+        "--known", help="YAML file with known points, tags or a board on the floor, and the lens."
+    ),
 ]
-Out = Annotated[Path, typer.Option("--out", help="The file to write, such as camera.yaml.")]
+Out = Annotated[Path, typer.Option("--out", help="File to write, such as camera.yaml.")]
 
 
 def calibrate(
     ctx: typer.Context,
     out: Out,
-    image: Annotated[Path | None, typer.Argument(help="Picture; not with --camera.")] = None,
+    image: Annotated[
+        Path | None, typer.Argument(help="Picture of the floor; omit with --camera.")
+    ] = None,
     camera: o.Camera = None,
     point: Points = None,
     known: KnownFile = None,
 ) -> None:
-    """Find out where on the floor a camera's pixels are; writes a file for --calibration.
+    """Find where on the floor a camera's pixels lie, for --calibration.
 
-    A picture of the floor as it is seen by that file is written beside it.
+    Writes the calibration file and, beside it, the picture rectified to a top view of the floor.
     """
     if (known is None) == (not point):
-        raise InputError("Give what is known of the floor: --known FILE, or four or more --point.")
+        raise InputError(
+            "Give what is known of the floor, either --known FILE or at least four --point."
+        )
     given = Known(points=tuple(map(_clicked, point or ()))) if known is None else read_known(known)
     picture = picture_given(ctx.params)
     if picture is None:
@@ -60,7 +66,7 @@ def calibrate(
         x, y, height = found.camera
         say(f"camera      above x {x:.2f} m, y {y:.2f} m, at a height of {height:.2f} m")
     if len(given.points) == 4:
-        say("note        four points fit whatever they are; a fifth would show a wrong one")
+        say("note        four points always fit exactly; a fifth would reveal a wrong one")
     say(f"written     {out}")
 
 

@@ -87,7 +87,7 @@ def chat(
     clearance: o.Clearance = None,
     seed: o.Seed = "0",
 ) -> None:
-    """Talk to the team: what it shall do, changes, questions; /help says what else."""
+    """Chat with the team: instruct, change, ask, undo; see /help."""
     picture = picture_given(ctx.params)
     settings = settings_given(ctx.params, picture)
     things = _in_order(ctx, arguments.shown((point, box, outline, target), mask, picture))
@@ -129,7 +129,9 @@ class Beginning:
             service.point(self.session, *self.pointed)
             return self.session
         if picture is None:
-            raise InputError("Name a picture to talk about, or a session to go on with.")
+            raise InputError(
+                "Give a picture to talk about, or a session to continue with --session ID."
+            )
         Context.of(picture, self.settings)  # raises before anything is stored
         return service.open(
             picture, settings=self.settings, pointed=self.pointed, keep_out=self.keep_out
@@ -157,13 +159,13 @@ async def _serve(
 
             ask = Prompt(data_folder() / "history", talk.words).ask
         who = service.session(talk.session).agent.model.name
-        display.line("session", f"{talk.session}, {who} decides; /help says what there is")
+        display.line("session", f"{talk.session}, model {who}; /help lists the commands")
         return await converse(talk, display, ask)
     finally:
         if service.session(talk.session).run is None:
             service.store.delete(talk.session)  # nothing was said in it
         else:
-            say(f"formup: formup chat --session {talk.session} goes on with this.", error=True)
+            say(f"formup: continue with formup chat --session {talk.session}", error=True)
         await service.close()
 
 
@@ -192,7 +194,7 @@ def _lines(script: Path | None, as_json: bool) -> Iterator[str] | None:
     if not at_terminal():
         return lines_piped()
     if as_json:
-        raise InputError("--json is for programs: say things with --script, or on stdin.")
+        raise InputError("--json is for programs; give the turns with --script FILE or on stdin.")
     return None
 
 
@@ -203,7 +205,9 @@ def _rules(policy: list[str] | None, auto: bool, plan_only: bool) -> list[str]:
         InputError: both `auto` and `plan_only` are set.
     """
     if auto and plan_only:
-        raise InputError("--auto moves robots at once, --plan-only never; give one of them.")
+        raise InputError(
+            "--auto moves robots at once and --plan-only never does; give only one of them."
+        )
     return ["deploy=refuse"] * plan_only + (policy or [])
 
 

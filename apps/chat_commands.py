@@ -22,7 +22,7 @@ from .sessions import export, list_words
 if TYPE_CHECKING:
     from .chat_lines import Talk
 
-NO_PLAN = "There is no plan yet; say what the robots shall do."
+NO_PLAN = "There is no plan yet; say what the robots should do."
 Done = Run | str | None
 """The result of a command: the run it made, a text to show, or None to end the chat."""
 
@@ -54,19 +54,19 @@ def command_named(line: str) -> Command:
         return COMMANDS[found[0]]
     meant = found or COMMANDS
     raise InputError(
-        f"There is no command {'/' + name!r}; there are {', '.join('/' + c for c in meant)}. "
-        "/help says what they do."
+        f"There is no command {'/' + name!r}; use one of {', '.join('/' + c for c in meant)} "
+        "(/help explains them)."
     )
 
 
 async def _help(talk: "Talk", rest: str, show: Show | None) -> Done:
     lines = [f"{' '.join(f'/{n} {c.takes}'.split())}: {c.help}" for n, c in COMMANDS.items()]
-    return "\n".join(["Say what the robots shall do, or ask; commands:", *lines])
+    return "\n".join(["Say what the robots should do, or ask a question. Commands:", *lines])
 
 
 async def _image(talk: "Talk", rest: str, show: Show | None) -> Done:
     if not rest:
-        raise InputError("/image: name the file of a picture, such as /image photo.jpg.")
+        raise InputError("/image needs the file of a picture, such as /image photo.jpg.")
     return await talk.service.image(talk.session, load_picture(Path(rest)))
 
 
@@ -105,7 +105,7 @@ async def _plan(talk: "Talk", rest: str, show: Show | None) -> Done:
     shown = report.model_copy(update={"plan_id": plan.id, "verdict": plan.verdict})
     lines += [f"{name}: {text}" for name, text in certificate_lines(shown)]
     lines += [f"made from {node.parent}"] if node.parent else []
-    lines += ["It is void: the picture, or what it is about, is another now."] * world.is_void(plan)
+    lines += ["The plan is void: its picture or target has changed since."] * world.is_void(plan)
     return "\n".join(lines)
 
 
@@ -118,7 +118,7 @@ async def _diff(talk: "Talk", rest: str, show: Show | None) -> Done:
     node = world.plans.get(world.current or "")
     parent = world.plans.get((node and node.parent) or "")
     if node is None or parent is None:
-        return "The plan that stands was made from no other." if node else NO_PLAN
+        return "The current plan was not made from another one." if node else NO_PLAN
     moves = moves_between(parent.plan, node.plan)
     lines = [f"{node.plan.id} was made from {parent.plan.id} by {node.edit or 'a new contract'}"]
     for robot, (old, new) in sorted(moves.moved.items(), key=lambda m: (len(m[0]), m[0])):
@@ -166,14 +166,14 @@ async def _save(talk: "Talk", rest: str, show: Show | None) -> Done:
     path = Path(rest) if rest else talk.folder.path / "plan.json"
     title = talk.run.report.instruction
     write_whole(path, plan_file(world, world.current, title, talk.run.context.picture))
-    return f"Plan {world.current} is in {path}; formup deploy {path} moves robots to it."
+    return f"Plan {world.current} is saved in {path}; formup deploy {path} moves robots to it."
 
 
 async def _sessions(talk: "Talk", rest: str, show: Show | None) -> Done:
     if rest:
         talk.service.reopen(rest)
         talk.session = rest
-        return f"This is session {talk.session} from here on."
+        return f"Switched to session {talk.session}."
     return f"This is session {talk.session}.\n{list_words(talk.service.store.sessions())}"
 
 
@@ -181,7 +181,7 @@ async def _who(talk: "Talk", rest: str, show: Show | None) -> Done:
     held = talk.service.session(talk.session)
     if rest:
         held.agent = talk.agents.enter_context(talk.agent_named(rest))
-    return f"{held.agent.model.name} decides."
+    return f"The model is {held.agent.model.name}."
 
 
 async def _cost(talk: "Talk", rest: str, show: Show | None) -> Done:
@@ -199,7 +199,7 @@ async def _cost(talk: "Talk", rest: str, show: Show | None) -> Done:
 
 async def _export(talk: "Talk", rest: str, show: Show | None) -> Done:
     if talk.service.session(talk.session).run is None:
-        return "Nothing was said in this session yet."
+        return "Nothing has been said in this session yet."
     folder = Path(rest) if rest else talk.folder.path / "session"
     return export(talk.service.store.open(talk.session), folder)
 
@@ -210,7 +210,7 @@ async def _point(talk: "Talk", rest: str, show: Show | None) -> Done:
         return await talk.service.say(talk.session, "", pointed=[thing], show=show)
     number = len(talk.service.session(talk.session).pointed) + 1
     talk.service.point(talk.session, thing.model_copy(update={"id": f"t{number}"}))
-    return "It goes with what you say next."
+    return "Noted; the point goes with your next message."
 
 
 async def _quit(talk: "Talk", rest: str, show: Show | None) -> Done:
@@ -218,24 +218,30 @@ async def _quit(talk: "Talk", rest: str, show: Show | None) -> Done:
 
 
 COMMANDS = {
-    "help": Command("", "what can be said and commanded", _help),
+    "help": Command("", "list the commands", _help),
     "image": Command(
-        "FILE", "another picture from here on; plans made before stay readable", _image
+        "FILE", "use another picture from here on; earlier plans stay readable", _image
     ),
-    "robots": Command("", "where each robot shall stand, stands, and how far from what", _robots),
-    "plan": Command("", "the plan that stands: what it demands, its certificate", _plan),
-    "show": Command("", "its picture again", _show_again, draws=True),
-    "diff": Command("", "what the last change moved, with a picture", _diff, draws=True),
-    "undo": Command("[N]", "back by a step or N; robots stay where they are", _undo),
-    "redo": Command("[N]", "forward again", _redo),
-    "approve": Command("[PLAN]", "your yes to moving real robots to that very plan", _approve),
-    "go": Command("[PLAN]", "robots move to the plan that stands, or to that one", _go),
+    "robots": Command(
+        "", "each robot's place, position, and distances to target and neighbour", _robots
+    ),
+    "plan": Command("", "the current plan: what it requires, and its certificate", _plan),
+    "show": Command("", "show the plan's picture again", _show_again, draws=True),
+    "diff": Command(
+        "", "show which robots the last change moved, with a picture", _diff, draws=True
+    ),
+    "undo": Command("[N]", "go back one step, or N; robots stay where they are", _undo),
+    "redo": Command("[N]", "go forward again one step, or N", _redo),
+    "approve": Command("[PLAN]", "approve moving real robots to exactly this plan", _approve),
+    "go": Command("[PLAN]", "move the robots to the current plan, or to PLAN", _go),
     "stop": Command("", "hold all robots where they are, at once; so does Ctrl-C", _stop),
-    "save": Command("[FILE]", "the plan as a file, for formup deploy", _save),
-    "sessions": Command("[ID]", "the sessions there are, or go on with another one", _sessions),
-    "model": Command("[PROVIDER:NAME]", "who decides, or another one from here on", _who),
-    "cost": Command("", "requests, tokens and dollars of this session", _cost),
-    "export": Command("[FOLDER]", "this session, to read and to keep", _export),
-    "point": Command("X,Y", "a point on the thing you mean, in pixels; also answers", _point),
-    "quit": Command("", "leave; the session is kept", _quit),
+    "save": Command("[FILE]", "save the plan to a file, for formup deploy", _save),
+    "sessions": Command("[ID]", "list the sessions, or switch to session ID", _sessions),
+    "model": Command(
+        "[PROVIDER:NAME]", "show the model that decides, or use another from here on", _who
+    ),
+    "cost": Command("", "show the requests, tokens and US dollars this session has used", _cost),
+    "export": Command("[FOLDER]", "export this session to a folder", _export),
+    "point": Command("X,Y", "point at a target, in pixels; also answers a question", _point),
+    "quit": Command("", "leave the chat; the session is kept", _quit),
 }

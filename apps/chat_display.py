@@ -38,7 +38,7 @@ class Display:
         """Show more of a reply's text as it streams; None voids what was shown of it."""
         if text is None:
             if self._streamed:
-                self.line("note", "The reply broke off; it begins anew.")
+                self.line("note", "The reply broke off and starts again.")
             self._streamed = ""
             return
         begins = not self._streamed

@@ -33,7 +33,7 @@ async def converse(talk: Talk, display: Display, ask: Ask) -> int:
             hits += 1
             if hits > 1:
                 return INTERRUPTED
-            display.line("", "Ctrl-C again, or /quit, leaves.")
+            display.line("", "Press Ctrl-C again, or type /quit, to leave.")
             continue
         if not text.strip():
             continue

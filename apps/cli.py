@@ -45,11 +45,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.add_typer(tools.app, name="tools", help="The tools the model sees.")
-app.add_typer(evaluate.app, name="eval", help="How good it is.")
-app.add_typer(sessions.app, name="sessions", help="Conversations that were stored.")
-app.add_typer(prompts.app, name="prompts", help="What models are told, in versions.")
-app.add_typer(fleet_commands.app, name="fleet", help="Robots: look at them, or stand in for them.")
+app.add_typer(tools.app, name="tools", help="List, describe and call the tools that models use.")
+app.add_typer(evaluate.app, name="eval", help="Evaluate formup on tasks with known answers.")
+app.add_typer(
+    sessions.app, name="sessions", help="List, search, copy, export and delete stored sessions."
+)
+app.add_typer(
+    prompts.app, name="prompts", help="Manage the versions of the prompts that models get."
+)
+app.add_typer(fleet_commands.app, name="fleet", help="Check a fleet of robots, or stand in for it.")
 
 
 def _say_version(wanted: bool) -> None:
@@ -62,10 +66,10 @@ def _say_version(wanted: bool) -> None:
 def formup(
     shown: Annotated[
         bool,
-        typer.Option("--version", callback=_say_version, is_eager=True, help="Say which this is."),
+        typer.Option("--version", callback=_say_version, is_eager=True, help="Show the version."),
     ] = False,
 ) -> None:
-    """Say where a team of robots should stand; get a certified formation, watch it arrive."""
+    """Say where a team of robots should stand; get a certified formation and watch it arrive."""
 
 
 @app.command()
@@ -134,9 +138,15 @@ def resume(
     policy: o.PolicyList = None,
     watch: o.Watch = False,
 ) -> None:
-    """Go on with a run that waits for a person, was stopped or killed; or say what comes next."""
+    """Continue a run that waits for you or was stopped or killed.
+
+    Answer its question, approve or refuse its plan, or give the next instruction.
+    """
     if words is not None and (answer is not None or approve is not None):
-        raise InputError("Give what to do next, or an answer with --answer, not both.")
+        raise InputError(
+            "Give either the next instruction or an answer (--answer, --approve, --refuse), not "
+            "both."
+        )
     path = log_path(folder)
     left = load_run(path, None if image is None else load_picture(image))
     start = read_events(path)[0].data
@@ -183,7 +193,10 @@ def demonstrate(out: o.DemoOut = Path("formup-runs", "demo")) -> None:
 
 @app.command(name="doctor")
 def look_around(as_json: o.Json = False) -> None:
-    """Say what is installed and within reach, for a report of a bug; nothing secret is shown."""
+    """Show what is installed and within reach, for bug reports.
+
+    Secrets are never shown.
+    """
     say(doctor.findings_text(as_json=as_json))
 
 
@@ -193,6 +206,6 @@ def _unchanged(agent: Agent, start: Mapping[str, Any]) -> None:
     for prompt in agent.prompts:
         if was.get(prompt.name, prompt.sha256) != prompt.sha256:
             raise InputError(
-                f"{prompt.name} is not what this run was begun with; put its text back, or run "
-                "again."
+                f"{prompt.name} has changed since this run began; restore its text, or start a "
+                "new run."
             )

@@ -44,17 +44,19 @@ def deploy(
     speed: o.FollowSpeed = None,
     trajectories: o.TrajectoryFile = None,
 ) -> None:
-    """Move robots to a certified plan; naming the file is the approval."""
+    """Move robots to a certified plan; naming the file approves it."""
     if speed is not None and follow is None:
-        raise InputError("--follow-speed says how fast robots may --follow; say for how long.")
+        raise InputError("--follow-speed needs --follow SECONDS; give that too.")
     leave = None if follow is None else Follow(seconds=follow, speed=speed)
     if trajectories is not None and (as_json or film or watch or leave):
         raise InputError(
-            "--trajectories moves no robot: leave out --json, --film, --watch and --follow."
+            "--trajectories moves no robots; leave out --json, --film, --watch and --follow."
         )
     stored = read_world(plan)
     if stored.plan_id is None or stored.plan_id not in stored.world.plans:
-        raise InputError(f"{plan} holds no plan to deploy; give a plan.json written by formup run.")
+        raise InputError(
+            f"{plan} contains no plan to deploy; give a plan.json written by formup run."
+        )
     picture = picture_of(stored, plan, None if image is None else load_picture(image))
     settings = Settings(fleet=fleet, approved=stored.plan_id)
     context = replace(Context.of(picture, settings, stored.world), words=stored.instruction or "")
@@ -94,7 +96,10 @@ def _export_trajectories(context: Context, chosen: Plan, plan: Path, path: Path)
     scale = context.world.metres_per_pixel
     text = json.dumps(found.data(scale)) if path.suffix.lower() == ".json" else found.table(scale)
     write_whole(path, text.encode())
-    say(f"formup: {len(found.ids)} robots' ways in {path}; none was moved.", error=True)
+    say(
+        f"formup: trajectories of {len(found.ids)} robots are in {path}; no robot was moved.",
+        error=True,
+    )
     return 0
 
 

@@ -20,15 +20,18 @@ from ..tools.errors import StorageError
 
 Looks = Iterator[tuple[str, str, Callable[[], object]]]
 PURPOSES = {
+    "all": "everyday use",
     "dev": "tests",
     "mcp": "MCP clients",
     "mqtt": "robots on MQTT",
-    "otel": "spans",
-    "postgres": "a store",
-    "ray": "evals on a cluster",
-    "ros": "robots that run ROS",
-    "serve": "a server",
-    "torch": "trained networks",
+    "otel": "OpenTelemetry spans",
+    "postgres": "sessions in PostgreSQL",
+    "ray": "evals on a Ray cluster",
+    "rl": "reinforcement learning baselines",
+    "ros": "robots on ROS",
+    "serve": "the HTTP server",
+    "sim": "the window of --watch",
+    "torch": "neural networks",
 }
 """What each extra is for; for other extras, their packages are listed."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox")
@@ -72,15 +75,15 @@ def _installed() -> Looks:
         yield "library", name, lambda n=name, own=own: (version(n), *map(import_module, own))[0]
     for extra, names in sorted(needed.items()):
         lacking = [n for n in names if _found_out(lambda n=n: version(n)).startswith("broken")]
-        state = f"lacks {', '.join(lacking)}" if lacking else "installed"
+        state = f"missing {', '.join(lacking)}" if lacking else "installed"
         yield "extra", extra, f"{state}; for {PURPOSES.get(extra, ', '.join(names))}".strip
 
 
 def _surroundings() -> Looks:
     shown = sys.platform != "linux" or {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ)
     cameras = sorted(Path("/dev").glob("video*"))  # not opened: one may hang
-    allowed = [f"{p} {'can' if os.access(p, os.R_OK) else 'cannot'} be read" for p in cameras]
-    yield "machine", "display", lambda: "there" if shown else "none"
+    allowed = [f"{p} {'is' if os.access(p, os.R_OK) else 'is not'} readable" for p in cameras]
+    yield "machine", "display", lambda: "available" if shown else "none"
     yield "machine", "browser", lambda: next(filter(shutil.which, BROWSERS), "none on the PATH")
     yield "machine", "camera", lambda: ", ".join(allowed) or "no /dev/video*"
     from ..agent.providers.remote import VARIABLES
@@ -101,7 +104,7 @@ def _storage() -> Looks:
         if file is not None and not file.exists():  # looking must not create it
             return f"{_writable(file)}; no sessions"
         with closing(store_at(address)) as store:
-            can = _writable(file) if file else f"{store.label} can be written"
+            can = _writable(file) if file else f"{store.label} is writable"
             try:
                 store.rename("none", "")  # a database checks who may write first
             except StorageError as error:
@@ -114,7 +117,7 @@ def _storage() -> Looks:
 
 def _writable(path: Path) -> str:
     there = next(p for p in (path, *path.parents) if p.exists())
-    return f"{path} {'can' if os.access(there, os.W_OK) else 'cannot'} be written"
+    return f"{path} {'is' if os.access(there, os.W_OK) else 'is not'} writable"
 
 
 def _registered() -> Looks:
@@ -125,6 +128,6 @@ def _registered() -> Looks:
 
     for kind in (FLEETS, DETECTORS, SEGMENTERS):
         for name in kind.names():
-            home = "built in" if name in kind.builtin else "of an installed package"
+            home = "built in" if name in kind.builtin else "from an installed package"
             yield kind.noun, name, lambda kind=kind, n=name, home=home: (home, kind.load(n))[0]
     yield "model", "names", ", ".join(MODELS).strip

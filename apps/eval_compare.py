@@ -56,18 +56,24 @@ def _command(concluded: Callable[[Comparison], int]) -> Callable[..., None]:
 
 @_command
 def compare(made: Comparison) -> int:
-    """Whether B is better or worse than A, whether it may replace A, and what would settle that."""
+    """Compare two versions: is B better or worse, may it replace A?
+
+    Where that is open, says how many tasks or trials would settle it.
+    """
     return 0
 
 
 @_command
 def gate(made: Comparison) -> int:
-    """The same, and whether B may replace A by the exit code: 0 pass, 1 block, 3 inconclusive."""
+    """Compare two versions, with the verdict as the exit code.
+
+    0: pass, B may replace A; 1: block; 3: inconclusive.
+    """
     return EXIT[made.verdict]
 
 
 def merge_shards(shards: o.Shards, out: o.MergedFolder) -> None:
-    """Put the trials of shards together in a new folder."""
+    """Merge the trials of several shards into a new folder."""
     count = merge(shards, out)
     join_stored(shards, out)
     say(f"{count:,} trials in {out}")
@@ -82,7 +88,7 @@ def _made(
 ) -> Comparison:
     measured, tolerated = _metric_named(metric), inputs.share("--margin", margin)
     if not tolerated:
-        raise InputError("--margin 0 can never be passed; give a share above 0, such as 0.05.")
+        raise InputError("--margin 0 can never be passed; give a fraction above 0, such as 0.05.")
     made = compared(arm_rows(*old, "--arm-a"), arm_rows(*new, "--arm-b"), measured, tolerated)
     if out is not None:
         write_whole(out, f"{made.model_dump_json(indent=1)}\n".encode())
@@ -114,9 +120,10 @@ def arm_rows(folder: Path, named: str | None, option: str) -> list[TrialRow]:
     chosen = {name for name, arm in arms.items() if all(_says(name, arm, word) for word in words)}
     chosen = {name for name in chosen if len(name.split()) == len(words)} or chosen
     if rows and len(chosen) != 1:
-        what = f"{option} {named!r} fits {len(chosen)} of these" if named else f"Give {option}"
+        fits = f"; {option} {named!r} fits {len(chosen)} of them" if named else ""
         raise InputError(
-            f"{folder} holds {len(arms)} arms. {what}, words of one: {'; '.join(sorted(arms))}."
+            f"{folder} holds {len(arms)} arms{fits}; choose one by its words with {option}: "
+            f"{'; '.join(sorted(arms))}."
         )
     return [row for row in rows if row.arm.name in chosen]
 
@@ -141,7 +148,7 @@ def _print_comparison(console: Console, made: Comparison) -> None:
     )
     if any(made.unpaired):
         a, b = made.unpaired
-        console.print(f"left out for want of a pair: {a} trials of A, {b} of B")
+        console.print(f"left out, as unpaired: {a} trials of A, {b} of B")
 
 
 def _scores(made: Comparison) -> Table:
@@ -205,7 +212,7 @@ def _print_conclusion(console: Console, made: Comparison) -> None:
         ]
         text = " or ".join(filter(None, ways)) or "more tasks and trials than can be run"
         points = f"{100 * settled.difference:.1f} points (power .8)"
-        console.print(f"to settle the {what}, telling {points}: {text}")
+        console.print(f"to settle the {what}, detecting {points}: {text}")
 
 
 def _shares(found: Range | None) -> str:

@@ -6,66 +6,85 @@ from typing import Annotated
 import typer
 
 SuiteName = Annotated[
-    str, typer.Argument(help="A suite's name (formup eval suites), YAML file or folder.")
+    str, typer.Argument(help="Name of a suite (see formup eval suites), YAML file or folder.")
 ]
 MethodName = Annotated[
     str,
     typer.Option(
         "--method",
-        help="rules, agent, alone, zerocap, segment-only, rl, pile, scatter, boundary, circle or "
-        "line.",
+        help="Method to evaluate: rules, agent, alone, zerocap, segment-only, rl, pile, scatter, "
+        "boundary, circle or line.",
     ),
 ]
 ModeName = Annotated[
-    str, typer.Option("--mode", help="How to point: truth, outline, drawn, box, point or words.")
+    str,
+    typer.Option(
+        "--mode", help="How targets are pointed at: truth, outline, drawn, box, point or words."
+    ),
 ]
 Seeds = Annotated[
-    str | None, typer.Option("--seeds", help="First and last seed of drawn scenes: 0-199.")
+    str | None,
+    typer.Option("--seeds", help="First and last seed of generated scenes, such as 0-199."),
 ]
-TaskList = Annotated[list[str] | None, typer.Option("--task", help="Only this task; repeatable.")]
+TaskList = Annotated[
+    list[str] | None, typer.Option("--task", help="Run only this task; repeatable.")
+]
 ModelList = Annotated[
     list[str] | None,
     typer.Option(
         "--model",
-        help="Of agent, alone and zerocap, as in formup run, or replay:FOLDER; of segment-only a "
-        "segmenter; of rl a folder of formup eval train-rl; repeatable.",
+        help="For agent, alone and zerocap a model as in formup run, or replay:FOLDER; for "
+        "segment-only a segmenter; for rl a folder of formup eval train-rl; repeatable.",
     ),
 ]
 PromptList = Annotated[
-    list[str] | None, typer.Option("--prompt", help="ID@VERSION; repeatable, side by side.")
+    list[str] | None,
+    typer.Option("--prompt", help="Prompt, ID@VERSION; repeatable, run side by side."),
 ]
 DescriptorList = Annotated[
     list[str] | None,
-    typer.Option("--descriptor", help="edges, edges+vertices or matrix; repeatable."),
+    typer.Option(
+        "--descriptor",
+        help="How shapes are described: edges, edges+vertices or matrix; repeatable.",
+    ),
 ]
 Trials = Annotated[
     str | None,
-    typer.Option("--trials", help="Tries of every task; 3 where --mode jitters it, else 1."),
+    typer.Option("--trials", help="Trials of each task; default: 3 if --mode adds jitter, else 1."),
 ]
-Split = Annotated[str, typer.Option("--split", help="train, dev or test (scores only).")]
+Split = Annotated[
+    str, typer.Option("--split", help="Split to run: train, dev or test (scores only).")
+]
 RunFolder = Annotated[
     Path | None,
-    typer.Option("--out", help="The folder of the run; one that is there is gone on with."),
+    typer.Option("--out", help="Folder of the run; if it exists, the run in it is continued."),
 ]
-Shard = Annotated[str | None, typer.Option("--shard", help="i/n: the i-th of n parts.")]
-Budget = Annotated[str | None, typer.Option("--budget", help="Most to spend, USD.")]
+Shard = Annotated[
+    str | None, typer.Option("--shard", help="Run only the i-th of n parts, given as i/n.")
+]
+Budget = Annotated[str | None, typer.Option("--budget", help="Maximum to spend, in USD.")]
 RateList = Annotated[
     list[str] | None,
-    typer.Option("--rate", help="MODEL=N: requests a minute at most, over all jobs; repeatable."),
+    typer.Option(
+        "--rate", help="MODEL=N: at most N requests per minute, over all jobs; repeatable."
+    ),
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; say what it would cost.")]
-Jobs = Annotated[str, typer.Option("--jobs", help="Processes at once.")]
-DescribedSuite = Annotated[str, typer.Argument(metavar="[SUITE]", help="Whose things.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Run nothing; estimate the cost.")]
+Jobs = Annotated[str, typer.Option("--jobs", help="Number of parallel processes.")]
+DescribedSuite = Annotated[
+    str, typer.Argument(metavar="[SUITE]", help="Suite whose things are described.")
+]
 NewFolder = Annotated[
-    Path, typer.Argument(metavar="FOLDER", help="Pictures with an annotations.json.")
+    Path, typer.Argument(metavar="FOLDER", help="Folder of pictures with an annotations.json.")
 ]
 Name = Annotated[
-    str | None, typer.Option("--name", help="Of the suite; the folder's name by default.")
+    str | None, typer.Option("--name", help="Name of the suite; default: the folder's name.")
 ]
-ReportedRun = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder.")]
+ReportedRun = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of the run.")]
 Against = Annotated[
-    Path | None, typer.Option("--against", help="Another run's folder, or the same: B beside A.")
+    Path | None,
+    typer.Option("--against", help="Folder of a run to show beside it as B; may be the same one."),
 ]
 PageFile = Annotated[
-    Path | None, typer.Option("--out", help="The HTML file; report.html in RUN by default.")
+    Path | None, typer.Option("--out", help="HTML file to write; default: report.html in RUN.")
 ]

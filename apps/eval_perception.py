@@ -15,23 +15,28 @@ from .terminal import say
 
 Suites = Annotated[
     list[str] | None,
-    typer.Argument(help="Suites of pictures.", show_default="photos photos-added"),
+    typer.Argument(help="Suites of pictures to measure.", show_default="photos photos-added"),
 ]
 Modes = Annotated[
     list[str] | None,
-    typer.Option("--mode", help="outline, box or point; repeatable.", show_default="all"),
+    typer.Option(
+        "--mode",
+        help="How things are pointed at: outline, box or point; repeatable.",
+        show_default="all",
+    ),
 ]
-Named = Annotated[str, typer.Option("--segmenter", help="As in formup run.")]
-AsJson = Annotated[bool, typer.Option("--json", help="As one JSON object.")]
+Named = Annotated[str, typer.Option("--segmenter", help="Segmenter to measure, as in formup run.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
 
 
 def perception(
     suites: Suites = None, mode: Modes = None, segmenter: Named = "grabcut", json_: AsJson = False
 ) -> None:
-    """Point at every thing of suites, three times each, and compare what is measured.
+    """Measure how accurate outlines are, on suites of pictures.
 
-    IoU is the overlap with the true outline, e95 the distance within which 95 % of the boundaries
-    lie, over the square root of the area; placed, whose confidence reaches the threshold.
+    Points three times at each thing. IoU is the overlap with the true outline; e95 the distance
+    within which 95 % of the boundaries lie, divided by the square root of the area; placed the
+    share of outlines whose confidence reaches the threshold.
     """
     chosen = segmenter_named(segmenter)
     rows: list[Row] = []

@@ -24,10 +24,11 @@ def report(
     out: e.PageFile = None,
     prompts: o.PromptsFolder = None,
 ) -> None:
-    """A run as one HTML file: counts by slice, pictures with robots and misses, transcripts.
+    """Write a run as one HTML file.
 
-    With --against, RUN is A and the other one B, side by side with their difference and that of
-    their prompts. Held-out tasks show their scores alone.
+    It has counts by slice, pictures with robots and misses, and transcripts. With --against, RUN is
+    A and the other run B, side by side with their difference and that of their prompts. Held-out
+    tasks show only their scores.
     """
     path = out or run / NAME
     sides = _sides(run, against, arm_a, arm_b)
@@ -38,7 +39,7 @@ def report(
 def _sides(run: Path, against: Path | None, arm_a: str | None, arm_b: str | None) -> list[Side]:
     if against is None:
         if arm_b is not None:
-            raise InputError("--arm-b goes with --against, which names the other run.")
+            raise InputError("--arm-b needs --against RUN, which names the other run.")
         rows = read_rows(run) if arm_a is None else arm_rows(run, arm_a, "--arm-a")
         if not rows:
             raise InputError(f"{run} holds no trials yet.")

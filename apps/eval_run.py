@@ -65,12 +65,13 @@ def run_suite(
     jobs: e.Jobs = "1",
     dry_run: e.DryRun = False,
 ) -> None:
-    """Run a suite: successes of trials by category and setup, with intervals and the chance level.
+    """Run a suite and count successes.
 
-    Several models, prompts and descriptors are run side by side. A killed run is gone on with by
-    naming its folder again. Tasks that cannot be pointed at in the mode, or have no recording
-    where one is replayed, are left out. The split test shows scores only, and each look at it is
-    written down.
+    Successes are counted by category and setup, with confidence intervals and the chance level.
+    Several models, prompts and descriptors are run side by side. To continue a killed run, give
+    its folder again with --out. Tasks that cannot be pointed at in the chosen mode, or that have
+    no recording to replay, are left out. The test split shows scores only, and each look at it is
+    recorded.
     """
     workers = inputs.whole("--jobs", jobs, least=1)
     rates = {name: n / workers for name, n in inputs.rates("--rate", rate, model or []).items()}
@@ -206,7 +207,9 @@ def tasks_tried(suite: Suite, arms: Sequence[Method], names: list[str] | None) -
     wanted = [known[name] for name in dict.fromkeys(names or known)]
     chosen = [task for task in wanted if all(arm.takes(task) for arm in arms)]
     if not chosen:
-        raise InputError("No task is left: none has a recording here, or is about one thing alone.")
+        raise InputError(
+            "No task is left to run: this method, model and --mode can try none of them."
+        )
     return chosen
 
 
@@ -219,7 +222,7 @@ def _render(suite: Suite, folder: Path) -> dict[str, RenderedPicture]:
 def _note_look(folder: Path, suite: str, sha256: str, trials: Sequence[Trial]) -> None:
     arms = sorted({trial.arm.name for trial in trials})
     count = look(folder, suite, sha256, arms)
-    text = f"formup: look {count} at the test split of {suite}, written down in {folder / LEDGER}."
+    text = f"formup: look {count} at the test split of {suite}, recorded in {folder / LEDGER}."
     say(text, error=True)
 
 
@@ -248,8 +251,8 @@ def _print_summary(
     content = {"suite": suite.name, "sha256": planned[0].suite, "arms": summary}
     write_whole(folder / SUMMARY, json.dumps(content, indent=1).encode())
     Console(highlight=False, soft_wrap=True).print(
-        "Success: k of n trials; the intervals are of these tasks alone. Right thing: it was the "
-        "one meant, of those known. Chance: the best of five policies that know where the thing is "
-        f"and nothing else.\n{folder}\n"
-        f"To look at it: formup eval report {folder}"
+        "Success: k of n trials; the intervals hold for these tasks only. Right thing: the one "
+        "that was meant, out of those known. Chance: the best of five policies that know where the "
+        f"thing is and nothing else.\n{folder}\n"
+        f"To view it: formup eval report {folder}"
     )

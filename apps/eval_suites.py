@@ -19,7 +19,7 @@ NAMED = 5
 
 
 def suites() -> None:
-    """The suites that ship with formup."""
+    """List the suites that ship with formup."""
     table = Table(header_style="cyan", box=None)
     for name in ("suite", "what it is"):
         table.add_column(name, no_wrap=name == "suite")
@@ -29,9 +29,10 @@ def suites() -> None:
 
 
 def add(folder: e.NewFolder, name: e.Name = None) -> None:
-    """Make a suite of a folder of pictures in the photos' format, once its tasks hold.
+    """Make a suite from a folder of pictures, and check its tasks.
 
-    Of every task a right answer must score 1 and answers without understanding less.
+    The folder has the format of the photos suite. The suite is kept only if, for each task, a
+    right answer scores 1 and answers without understanding score less.
     """
     path = write_suite(folder, name or folder.resolve().name)
     try:
@@ -43,11 +44,11 @@ def add(folder: e.NewFolder, name: e.Name = None) -> None:
     except InputError:
         path.unlink()
         raise
-    say(f"{path}: {len(made.tasks)} tasks. Run them: formup eval run {folder}")
+    say(f"{path}: {len(made.tasks)} tasks. Run it: formup eval run {folder}")
 
 
 def descriptors(suite: e.DescribedSuite = "photos") -> None:
-    """Tokens that each way of putting a shape into text costs, over the things of a suite."""
+    """Count the tokens each shape descriptor takes, over a suite."""
     table = Table(title="describe_shape", header_style="cyan", box=None)
     for name in ("descriptor", "median tokens", "most", "beyond edges"):
         table.add_column(name, justify="left" if name == "descriptor" else "right")

@@ -34,31 +34,35 @@ from .terminal import say, styled
 TERMINAL = "terminal"
 HEAD, CELL = 28, 12
 """Widths in characters of the first column and the others; a table may outgrow the terminal."""
-Name = Annotated[str, typer.Argument(metavar="TABLE", help="1, 2, 3, hard or ablations.")]
+Name = Annotated[
+    str, typer.Argument(metavar="TABLE", help="Table to make: 1, 2, 3, hard or ablations.")
+]
 Models = Annotated[
     list[str] | None,
-    typer.Option("--models", help="As in formup run, or replay:FOLDER; repeatable."),
+    typer.Option("--models", help="Model as in formup run, or replay:FOLDER; repeatable."),
 ]
 Segmenters = Annotated[
     list[str] | None,
-    typer.Option("--segmenter", help="A network: NAME or NAME:CHECKPOINT; repeatable."),
+    typer.Option("--segmenter", help="Segmentation network: NAME or NAME:CHECKPOINT; repeatable."),
 ]
 Methods = Annotated[
-    list[str] | None, typer.Option("--method", help="Only rows of this method; repeatable.")
+    list[str] | None, typer.Option("--method", help="Run only rows of this method; repeatable.")
 ]
 Checkpoints = Annotated[
-    Path | None, typer.Option("--checkpoints", help="Of formup eval train-rl, for the method rl.")
+    Path | None,
+    typer.Option("--checkpoints", help="Folder of formup eval train-rl, for the method rl."),
 ]
 Versions = Annotated[
     list[str] | None,
-    typer.Option("--prompt", help="ID@VERSION that an ablation is made with; repeatable."),
+    typer.Option("--prompt", help="Prompt to ablate with, ID@VERSION; repeatable."),
 ]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on with the latest run of the table.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue the latest run of the table.")]
 Form = Annotated[
     str, typer.Option("--format", help=f"What is printed: {', '.join([TERMINAL, *FORMATS])}.")
 ]
 Tries = Annotated[
-    str | None, typer.Option("--trials", help="Tries of every task, in place of the table's own.")
+    str | None,
+    typer.Option("--trials", help="Trials of each task, instead of the table's own number."),
 ]
 
 
@@ -80,10 +84,11 @@ def table(
     jobs: e.Jobs = "1",
     form: Form = TERMINAL,
 ) -> None:
-    """Run a table of the paper, print it, and write it as Markdown, CSV, JSON, LaTeX and HTML.
+    """Run a table of the paper and print it.
 
-    Each cell is k of n trials with an interval and the paper's figure beside it; what was not run
-    says so, and what it would cost. A killed run is gone on with by naming its folder again.
+    It is also written as Markdown, CSV, JSON, LaTeX and HTML. Each cell shows k of n trials with
+    a confidence interval and the paper's figure; cells that were not run say so, with the cost of
+    running them. To continue a killed run, give its folder again with --out.
     """
     if form not in (TERMINAL, *FORMATS):
         raise InputError(f"Unknown format {form!r}. There are: {TERMINAL}, {', '.join(FORMATS)}.")
@@ -141,7 +146,7 @@ def _folder(name: str, resume: bool) -> Path:
         return new_folder(f"table-{name}")
     found = sorted(RUNS.glob(f"table-{name}-*"))
     if not found:
-        raise InputError(f"There is no run of table {name} in {RUNS}; leave --resume out.")
+        raise InputError(f"There is no run of table {name} in {RUNS}; leave out --resume.")
     return found[-1]
 
 

@@ -78,8 +78,8 @@ def print_spent(rows: Sequence[TrialRow]) -> None:
     spent = [(r.requests, r.input_tokens, r.cached_tokens, r.output_tokens) for r in scored]
     requests, sent, cached, got = (f"{median(counts):,.0f}" for counts in zip(*spent, strict=True))
     Console(highlight=False, soft_wrap=True).print(
-        f"A trial in the median: requests {requests}; tokens in {sent}, {cached} where the prompt "
-        f"is cached; tokens out {got}."
+        f"Median of a trial: {requests} requests, {sent} input tokens ({cached} where the prompt "
+        f"is cached), {got} output tokens."
     )
 
 

@@ -15,15 +15,24 @@ from .terminal import say
 
 CURVE = "curve.png"
 Folder = Annotated[
-    Path, typer.Option("--out", help="For checkpoints; what is trained there is left as it is.")
+    Path,
+    typer.Option("--out", help="Folder for checkpoints; policies already trained there are kept."),
 ]
 Categories = Annotated[
     list[str] | None,
-    typer.Option("--category", help="general, infill or caging; repeatable.", show_default="all"),
+    typer.Option(
+        "--category",
+        help="Category to train: general, infill or caging; repeatable.",
+        show_default="all",
+    ),
 ]
-Robots = Annotated[str, typer.Option("--robots", "-n", help="Of each team that is trained.")]
-Seeds = Annotated[str, typer.Option("--seeds", help="Policies of each category.")]
-Steps = Annotated[str, typer.Option("--steps", help="Most steps of robots for each policy.")]
+Robots = Annotated[
+    str, typer.Option("--robots", "-n", help="Number of robots in each trained team.")
+]
+Seeds = Annotated[
+    str, typer.Option("--seeds", help="Number of policies per category, each with its own seed.")
+]
+Steps = Annotated[str, typer.Option("--steps", help="Maximum number of robot steps per policy.")]
 
 
 def train_rl(
@@ -33,10 +42,11 @@ def train_rl(
     seeds: Seeds = "5",
     steps: Steps = "3,000,000",
 ) -> None:
-    """Train policies by PPO until their scores stay where they are, or the budget is spent.
+    """Train policies with PPO, for the method rl.
 
-    One reward a category, one policy for all robots of a team, one of each seed. A killed training
-    is gone on with by naming its folder again; formup eval table 1 --checkpoints tries them.
+    Training ends when scores level off or the budget of steps is spent. Each category has one
+    reward; a policy drives all robots of a team, and one is trained per seed. To continue a killed
+    training, give its folder again; formup eval table 1 --checkpoints evaluates the policies.
     """
     size = inputs.whole("--robots", robots, least=1, most=100)
     chosen: list[Category] = [c for c in CATEGORIES if category is None or c in category]
@@ -48,11 +58,13 @@ def train_rl(
     known = {c.name: c for c in read_checkpoints(out)}
     other = sorted({c.robots for c in known.values()} - {size})
     if other:
-        raise InputError(f"{out} is of teams of {other[0]}, not {size}; use another folder.")
+        raise InputError(
+            f"{out} holds policies for teams of {other[0]}, not {size}; use another folder."
+        )
     try:
         from ..evals.rl.train import train
     except ImportError:
-        raise InputError("Training needs the extra: pip install 'formup[rl]'.") from None
+        raise InputError("Training needs an extra: pip install 'formup[rl]'.") from None
 
     out.mkdir(parents=True, exist_ok=True)
     for name in chosen:
@@ -65,7 +77,7 @@ def train_rl(
     write_whole(out / CURVE, picture(made))
     for name in CATEGORIES:
         _print_category(name, [c for c in made if c.category == name])
-    say(f"{out / CURVE}\nTo try them: formup eval table 1 --method rl --checkpoints {out}")
+    say(f"{out / CURVE}\nTo evaluate them: formup eval table 1 --method rl --checkpoints {out}")
 
 
 def _print(made: Checkpoint) -> None:

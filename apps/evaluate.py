@@ -17,7 +17,7 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 @app.callback()
 def group() -> None:
-    """How good it is, on tasks with known answers."""
+    """Evaluate formup on tasks with known answers."""
 
 
 app.command(name="suites")(eval_suites.suites)

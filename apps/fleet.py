@@ -26,8 +26,12 @@ from ..tools.fleet.wire.stopping import stopped
 from .terminal import say
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
-File = Annotated[Path, typer.Argument(help="A fleet's YAML file.", show_default=False)]
-Seconds = Annotated[float, typer.Option("--seconds", help="To listen for.", min=0.1, max=3600)]
+File = Annotated[
+    Path, typer.Argument(help="YAML file that describes the fleet.", show_default=False)
+]
+Seconds = Annotated[
+    float, typer.Option("--seconds", help="How long to listen, in seconds.", min=0.1, max=3600)
+]
 
 CHECKUPS: Mapping[type[WireSettings], Callable[[Any, float], tuple[list[str], bool]]] = {
     MqttSettings: mqtt_checked,
@@ -48,7 +52,10 @@ STAND_INS: Mapping[type[WireSettings], Callable[[Any, Callable[[str], None]], An
 
 @app.command()
 def check(file: File, seconds: Seconds = 3.0) -> None:
-    """Say who is there and what is wrong; nothing is moved. Ends with 4 where all is not well."""
+    """Check which robots are there and what is wrong; moves nothing.
+
+    The exit code is 4 if anything is wrong.
+    """
     settings = described_as(WireSettings, file)
     told, fit = CHECKUPS[type(settings)](settings, seconds)
     say("\n".join(told))
@@ -66,7 +73,7 @@ def stop(file: File) -> None:
 
 @app.command()
 def simulate(file: File) -> None:
-    """Stand in for the robots of a file on the same wire, until Ctrl-C."""
+    """Stand in for a fleet's robots, over its protocol, until Ctrl-C."""
     settings = described_as(WireSettings, file)
     robots = STAND_INS[type(settings)](settings, lambda text: say(f"formup: {text}"))
     say(f"formup: standing in for {len(settings.robots)} robots at {settings.where}.")

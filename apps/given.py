@@ -47,9 +47,9 @@ def picture_given(options: Mapping[str, Any]) -> Picture | None:
     """
     image, camera, file = options["image"], options["camera"], options.get("calibration")
     if image is not None and camera is not None:
-        raise InputError(f"--camera takes the picture; leave out {str(image)!r}, or the camera.")
+        raise InputError(f"Both {str(image)!r} and --camera give a picture; leave out one of them.")
     if file is not None and options["metres_per_pixel"] is not None:
-        raise InputError("--calibration says the scale; leave out --metres-per-pixel.")
+        raise InputError("--calibration already sets the scale; leave out --metres-per-pixel.")
     calibration = None if file is None else read_calibration(Path(file))
     if image is None and camera is None:
         if calibration is not None:

@@ -56,7 +56,7 @@ def _say_broken(error: Exception) -> int:
     if sys.argv[1:2] == ["doctor"]:
         print(visible(doctor.findings_text(as_json="--json" in sys.argv)))  # noqa: T201
         return 0
-    advice = "formup doctor says what is broken; install that anew."
+    advice = "formup doctor shows what is broken; reinstall that."
     print(f"formup: {visible(str(error))}; {advice}", file=sys.stderr)  # noqa: T201
     return 2
 
@@ -77,7 +77,7 @@ def _run() -> int:
             raise KeyboardInterrupt
         return code
     except typer.TyperException as error:
-        say_failed(f"{error.format_message()} (--help shows what there is)")
+        say_failed(f"{error.format_message()} (see --help)")
         return 2
     except typer.Abort:
         raise KeyboardInterrupt from None

@@ -30,7 +30,7 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 @app.command("list")
 def list_prompts(prompts: o.PromptsFolder = None, as_json: o.Json = False) -> None:
-    """All prompts; an asterisk marks the version that an id alone stands for."""
+    """List all prompts; an asterisk marks the current version of an ID."""
     rows = _rows(PromptLibrary(prompts))
     if as_json:
         say(json.dumps(rows, indent=2, ensure_ascii=False))
@@ -47,7 +47,7 @@ def list_prompts(prompts: o.PromptsFolder = None, as_json: o.Json = False) -> No
 
 @app.command()
 def show(name: o.PromptArgument, prompts: o.PromptsFolder = None) -> None:
-    """A prompt's file, with its name and hashes above it."""
+    """Print a prompt's file, below its name and hashes."""
     prompt = PromptLibrary(prompts).load(name)
     say(f"{prompt.name}\ntext {prompt.sha256}\nfile {prompt.file_sha256}\n")
     say(prompt.source, end="")
@@ -57,14 +57,14 @@ def show(name: o.PromptArgument, prompts: o.PromptsFolder = None) -> None:
 def render(
     name: o.PromptArgument, var: o.Variables = None, prompts: o.PromptsFolder = None
 ) -> None:
-    """The text as a model is told it, with values in the place of its inputs."""
+    """Print a prompt as the model gets it, with its inputs filled in."""
     prompt = PromptLibrary(prompts).load(name)
     say(prompt.render(inputs.variables(var, prompt.front.inputs)), end="")
 
 
 @app.command()
 def new(name: o.DraftName, parent: o.ParentName = None, prompts: o.PromptsFolder = None) -> None:
-    """Begin a draft, from the current version or another."""
+    """Start a draft from the current version or another one."""
     say(new_draft(PromptLibrary(prompts), name, parent))
 
 
@@ -72,7 +72,7 @@ def new(name: o.DraftName, parent: o.ParentName = None, prompts: o.PromptsFolder
 def show_diff(
     old: o.PromptArgument, new: o.PromptArgument, prompts: o.PromptsFolder = None
 ) -> None:
-    """How two prompts differ, in front matter and text."""
+    """Show how two prompts differ, in front matter and text."""
     library = PromptLibrary(prompts)
     styles = {"+": ADDED, "-": REMOVED, "@": PLACE}
     for line in diff(library.load(old), library.load(new)):
@@ -84,7 +84,7 @@ def show_diff(
 def lint_prompts(
     names: o.PromptNames = None, prompts: o.PromptsFolder = None, as_json: o.Json = False
 ) -> None:
-    """What is wrong with prompts, all of it; exit code 1 if any of it is an error."""
+    """List all problems of prompts; exit code 1 if any is an error."""
     found = _findings(PromptLibrary(prompts), names)
     if as_json:
         say(json.dumps([asdict(f) for f in found], indent=2, ensure_ascii=False))
@@ -101,7 +101,7 @@ def lint_prompts(
 
 @app.command("log")
 def show_log(id: o.PromptId, prompts: o.PromptsFolder = None) -> None:
-    """When and why versions were released and became current."""
+    """Show when and why versions were released and promoted."""
     for entry in log(PromptLibrary(prompts), id):
         line = styled((f"{entry.on}  {entry.name} ", "cyan"), f"{entry.what}: {entry.why}")
         _console().print(line, soft_wrap=True)
@@ -109,7 +109,7 @@ def show_log(id: o.PromptId, prompts: o.PromptsFolder = None) -> None:
 
 @app.command()
 def tree(prompts: o.PromptsFolder = None, baselines: o.Baselines = None) -> None:
-    """Which version was made from which, with scores if there are any."""
+    """Show which version was made from which, with any scores."""
     library, scores = PromptLibrary(prompts), inputs.scores(baselines)
     rows = [row for row in _rows(library) if not row["error"]]
     children = lineage([library.load(row["name"]) for row in rows])
@@ -132,13 +132,13 @@ def release_draft(
 ) -> None:
     """Freeze a draft as the next version; lint must find no error in it.
 
-    What a comparison says of the draft goes into the changelog.
+    With --report, the result of the comparison goes into the changelog.
     """
     library = PromptLibrary(prompts)
     errors = [f for f in _findings(library, [name]) if f.severity == "error"]
     if errors:
         found = " ".join(f.sentence for f in errors)
-        raise InputError(f"{name} is not released, for lint finds: {found}")
+        raise InputError(f"{name} is not released, because lint found errors: {found}")
     draft, verdict, sentence = library.load(name), "pass", ""
     if report is not None:
         verdict, sentence = verdict_of(report, draft)
@@ -146,7 +146,7 @@ def release_draft(
     released = release(library, name, why, _today(), tool_hashes(draft))
     say(released)
     if verdict != "pass":
-        say(f"formup: {released} is released, but not passed: {sentence}.", error=True)
+        say(f"formup: {released} is released, but has not passed: {sentence}.", error=True)
 
 
 @app.command("promote")
@@ -157,16 +157,17 @@ def promote_version(
     why: o.Why = "",
     prompts: o.PromptsFolder = None,
 ) -> None:
-    """Make a version the current one, on a comparison that it passed."""
+    """Make a version the current one, after a comparison that it passed."""
     library = PromptLibrary(prompts)
     prompt = library.load(name)
     if force == (report is not None):
         raise InputError(
-            "A promotion takes a comparison that passed, --report FILE, or --force --why TEXT."
+            "A promotion needs either a comparison that passed, --report FILE, or --force "
+            "--why TEXT."
         )
     if report is None:
         if not why.strip():
-            raise InputError('--force takes a reason for the changelog: --why "...".')
+            raise InputError('--force needs a reason for the changelog: --why "...".')
         promote(library, prompt.name, f"forced: {why}", _today(), None)
     else:
         current = library.load(prompt.id)

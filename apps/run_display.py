@@ -61,7 +61,7 @@ def show_report(console: Console, report: Report, folder: str) -> None:
         for group in report.contract.groups:
             _line(console, "contract", group_words(group, _scale(report)))
         if report.contract.keep_out:
-            _line(console, "", f"kept off: {', '.join(report.contract.keep_out)}")
+            _line(console, "", f"keep out of {', '.join(report.contract.keep_out)}")
     if report.verdict is not None:
         for name, text in certificate_lines(report):
             _line(console, name, text)
@@ -94,14 +94,14 @@ def _files(console: Console, report: Report, folder: str) -> None:
     if report.contract is not None and "contract" in files:
         written = report.contract.model_dump_json(exclude_defaults=True)
         console.print(styled((f"{'would do':>12}  ", "cyan"), written), soft_wrap=True)
-        _line(console, "", f"to have that, run again with --contract {folder}/{files['contract']}")
+        _line(console, "", f"to use it, run again with --contract {folder}/{files['contract']}")
     film = files.pop("film", None)
     if film:
         _line(console, "film", film)
     if files:
         _line(console, "files", f"{folder}/ {', '.join(files.values())}")
     if files and report.status in GOING_ON:
-        _line(console, "go on", f"formup resume {folder}{GOING_ON[report.status]}")
+        _line(console, "continue", f"formup resume {folder}{GOING_ON[report.status]}")
 
 
 def at_terminal() -> bool:
@@ -111,7 +111,7 @@ def at_terminal() -> bool:
 
 def ask(what: str) -> str:
     """Ask for the answer to the question just shown; return it, empty to leave it open."""
-    say(f"{what} (Enter leaves it open): ", end="")
+    say(f"{what} (Enter to leave it open): ", end="")
     line = sys.stdin.buffer.readline()  # not input(): it fails on bytes that are not text
     if not line.endswith(b"\n"):
         say("")
@@ -236,12 +236,12 @@ def _motion(motion: MotionVerdict, scale: float | None) -> str:
     """Return the certificate of a motion as text."""
     if not motion.certified:
         return f"not certified: {motion.findings[0].sentence}"
-    words = [f"{motion.makespan_s:.1f} s, longest way {length_text(motion.longest_px, scale)}"]
+    words = [f"{motion.makespan_s:.1f} s, longest path {length_text(motion.longest_px, scale)}"]
     if motion.separation_px is not None:
         words.append(f"robots at least {length_text(motion.separation_px, scale)} apart")
-        words.append(f"{length_text(motion.demanded_px, scale)} needed")
+        words.append(f"{length_text(motion.demanded_px, scale)} required")
     if motion.clearance_px is not None:
-        words.append(f"{length_text(motion.clearance_px, scale)} off obstacles")
+        words.append(f"{length_text(motion.clearance_px, scale)} from obstacles")
     return ", ".join(words)
 
 

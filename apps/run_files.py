@@ -47,7 +47,7 @@ class Folder:
             probe.touch()
             probe.unlink()
         except (OSError, RecursionError, ValueError) as error:
-            why = error.strerror if isinstance(error, OSError) else "no usable path"
+            why = error.strerror if isinstance(error, OSError) else "not a usable path"
             raise InputError(
                 f"The output folder {self.path} cannot be written: {why}; give another with --out."
             ) from None
@@ -192,8 +192,8 @@ def trajectory_file(path: Path | None) -> Path | None:
 def _writable(option: str, path: Path | None, endings: Sequence[str]) -> Path | None:
     if path is not None and (path.suffix.lower() not in endings or not path.parent.is_dir()):
         raise InputError(
-            f"{option} {path} cannot be written; name a file ending in {', '.join(endings)} in a "
-            "folder that is there."
+            f"{option} {path} cannot be written; name a file ending in {', '.join(endings)} in an "
+            "existing folder."
         )
     return path
 

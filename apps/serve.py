@@ -24,13 +24,21 @@ if TYPE_CHECKING:
 NEEDED = "formup serve needs an extra that is not installed: pip install 'formup[serve]'."
 TOKENS = "tokens.json"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-tokens = typer.Typer(help="Who may reach a server: names, scopes and hashes in a file.")
-Host = Annotated[str | None, typer.Option(help="Address to listen on; loopback by default.")]
-Port = Annotated[int | None, typer.Option(help="Port to listen on; 8734 by default.")]
-TokensFile = Annotated[Path | None, typer.Option("--tokens", help="File with hashed tokens.")]
+tokens = typer.Typer(help="Manage who may use a server: names, scopes, hashed tokens.")
+Host = Annotated[
+    str | None, typer.Option(help="Address to listen on; default: 127.0.0.1, this machine only.")
+]
+Port = Annotated[int | None, typer.Option(help="Port to listen on; default: 8734.")]
+TokensFile = Annotated[Path | None, typer.Option("--tokens", help="File of hashed tokens.")]
 Models = Annotated[
     list[str] | None,
-    typer.Option("--model", help="Who decides; several times for several, the first is usual."),
+    typer.Option(
+        "--model",
+        help="Model that decides, as in formup run; repeatable, the first is the default.",
+    ),
+]
+NewFleet = Annotated[
+    str | None, typer.Option("--fleet", help="Fleet of new sessions: NAME, or a YAML FILE.")
 ]
 
 
@@ -46,12 +54,15 @@ def serve(
     prompts: o.PromptsFolder = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
-    fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+    fleet: NewFleet = None,
     detector: o.DetectorName = None,
     segmenter: o.SegmenterName = None,
     threshold: o.Threshold = None,
 ) -> None:
-    """The team over HTTP: an API of its own, OpenAI's, and MCP, for chatbots and programs."""
+    """Serve the team over HTTP to browsers, chatbots and programs.
+
+    It speaks an API of its own, OpenAI's API, and MCP.
+    """
     try:
         from .server.run import run
         from .server.settings import ServerSettings
@@ -105,40 +116,44 @@ def check_reach(settings: "ServerSettings") -> None:
     """
     if settings.host not in LOOPBACK and settings.tokens_file is None:
         raise InputError(
-            f"On {settings.host} others can reach this server, and robots with it: make a token "
-            "with formup tokens add NAME, or listen on 127.0.0.1."
+            f"On {settings.host} others can reach this server and its robots; create a token with "
+            "formup tokens add NAME, or listen on 127.0.0.1."
         )
     if settings.tokens_file is not None and not settings.tokens_file.is_file():
         raise InputError(
-            f"There is no file of tokens {settings.tokens_file}, so that nobody could get in: make "
-            f"one with formup tokens add NAME --tokens {settings.tokens_file}."
+            f"The token file {settings.tokens_file} does not exist, so nobody could get in; create "
+            f"it with formup tokens add NAME --tokens {settings.tokens_file}."
         )
 
 
 @tokens.command("add")
 def add(
-    name: Annotated[str, typer.Argument(help="Whose it is: small letters, digits, underscores.")],
-    scope: Annotated[str, typer.Option(help="read, plan, move or approve.")] = "plan",
+    name: Annotated[
+        str, typer.Argument(help="Name of the owner: lowercase letters, digits, underscores.")
+    ],
+    scope: Annotated[
+        str, typer.Option(help="What the token allows: read, plan, move or approve.")
+    ] = "plan",
     file: TokensFile = None,
 ) -> None:
-    """Make a token and show it, this once."""
+    """Create a token and print it; it cannot be shown again."""
     say(_tokens(file).add(name, scope))
 
 
 @tokens.command("list")
 def listed(file: TokensFile = None) -> None:
-    """The names and scopes there are."""
+    """List the tokens: name, scope, date."""
     for entry in _tokens(file).entries():
         say(f"{entry.name}  {entry.scope}  since {entry.created}")
 
 
 @tokens.command("remove")
 def remove(
-    name: Annotated[str, typer.Argument(help="Whose it is.")], file: TokensFile = None
+    name: Annotated[str, typer.Argument(help="Name of the owner.")], file: TokensFile = None
 ) -> None:
-    """Take a token away, at once; sessions made with it stay."""
+    """Revoke a token at once; sessions made with it are kept."""
     _tokens(file).remove(name)
-    say(f"The token {name} is no longer taken.")
+    say(f"The token {name} is revoked.")
 
 
 def _tokens(file: Path | None) -> "Tokens":

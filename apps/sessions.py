@@ -23,57 +23,75 @@ LONGEST = 100
 """Most characters of a session's name and words in a list."""
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
-SessionId = Annotated[str, typer.Argument(metavar="ID", help="Of a session, as in the list.")]
-SearchText = Annotated[str, typer.Argument(help="Part of a name or of what was said.")]
-NewName = Annotated[str, typer.Argument(help="What it is called from now on.")]
-LastTurn = Annotated[int | None, typer.Option("--turn", help="The last turn it keeps; else all.")]
-ExportFolder = Annotated[Path, typer.Argument(help="A folder that has none yet.")]
+SessionId = Annotated[
+    str, typer.Argument(metavar="ID", help="ID of a session, as formup sessions list shows it.")
+]
+SearchText = Annotated[str, typer.Argument(help="Text to look for, in names and in what was said.")]
+NewName = Annotated[str, typer.Argument(help="New name of the session.")]
+LastTurn = Annotated[
+    int | None, typer.Option("--turn", help="Last turn to copy; default: all turns.")
+]
+ExportFolder = Annotated[
+    Path, typer.Argument(help="Folder to write to; it must not hold a session yet.")
+]
 
 
 @app.command("list")
 def list_sessions(store: o.StoreUrl = None, as_json: o.Json = False) -> None:
-    """The sessions there are, the newest first."""
+    """List the stored sessions, newest first."""
     _list(store, "", as_json)
 
 
 @app.command()
 def search(text: SearchText, store: o.StoreUrl = None, as_json: o.Json = False) -> None:
-    """The sessions whose names, or what was said in them, have a text in them."""
+    """List the sessions whose name or conversation contains a text."""
     _list(store, text, as_json)
 
 
 @app.command()
 def show(session: SessionId, store: o.StoreUrl = None) -> None:
-    """A session step by step: what was said and called, times, tokens, cost."""
+    """Show a session step by step.
+
+    Prints messages, tool calls, times, tokens and cost.
+    """
     with _at(store) as there:
-        events, how_on = there.open(session).events(), f"formup chat --session {session} goes on"
+        events, how_on = (
+            there.open(session).events(),
+            f"continue with formup chat --session {session}",
+        )
     show_events(events, lambda sha256: sha256[:16], session, how_on)
 
 
 @app.command()
 def rename(session: SessionId, name: NewName, store: o.StoreUrl = None) -> None:
-    """Give a session a name."""
+    """Rename a session."""
     with _at(store) as there:
         there.rename(session, name)
 
 
 @app.command()
 def fork(session: SessionId, turn: LastTurn = None, store: o.StoreUrl = None) -> None:
-    """A new session that goes on from a turn of another one, which stays as it is."""
+    """Copy a session up to a turn into a new one, and print its ID.
+
+    The session itself stays as it is.
+    """
     with _at(store) as there:
         say(fork_of(there, there.open(session), turn).id)
 
 
 @app.command(name="export")
 def export_session(session: SessionId, folder: ExportFolder, store: o.StoreUrl = None) -> None:
-    """A session as a folder: a page with pictures, all events as JSON, and what trace reads."""
+    """Export a session to a folder.
+
+    Writes a page with pictures, all events as JSON, and the files that formup trace reads.
+    """
     with _at(store) as there:
         say(export(there.open(session), folder))
 
 
 @app.command()
 def delete(session: SessionId, store: o.StoreUrl = None) -> None:
-    """Delete a session and its files; there is no way back."""
+    """Delete a session and its files; this cannot be undone."""
     with _at(store) as there:
         there.delete(session)
 
@@ -87,7 +105,7 @@ def export(session: StoredSession, folder: Path) -> str:
     export_folder(session, folder)
     written = (export_page(session, folder), export_json(session, folder))
     page, events = (path.name for path in written)
-    return f"It is in {folder}: {page} to read, {events}, and all that formup trace shows."
+    return f"Exported to {folder}: {page} to read, {events}, and the files that formup trace reads."
 
 
 def list_words(found: Sequence[SessionFacts]) -> str:

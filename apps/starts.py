@@ -13,7 +13,7 @@ from ..tools.store import read_text
 
 ACROSS = ("x", "col", "column")
 COLUMN = re.compile(r"(x|y|col|column|row)[ _]*[\[(]?(?:px|pixels?)?[\])]?", re.IGNORECASE)
-FORM = "give x,y a line (x;y where commas are decimal), or JSON [[x, y], ...], in pixels"
+FORM = "give one x,y per line (x;y with decimal commas), or JSON [[x, y], ...], in pixels"
 
 
 def starts(path: Path | None) -> tuple[Point, ...] | None:
@@ -38,7 +38,7 @@ def starts(path: Path | None) -> tuple[Point, ...] | None:
         values = np.empty(0)
     pairs = values.ndim == 2 and values.shape[1:] == (2,)
     if not pairs or not (np.abs(values) <= FARTHEST).all():
-        raise InputError(f"--starts {path} holds no positions that can be used; {FORM}.")
+        raise InputError(f"--starts {path} holds no usable positions; {FORM}.")
     return tuple(zip(values[:, 0].tolist(), values[:, 1].tolist(), strict=True))
 
 
@@ -58,6 +58,8 @@ def _table(text: str, name: str) -> list[list[float]]:
         try:
             x, y = map(float, cells)
         except ValueError:
-            raise InputError(f"{name}, line {n}: {line[:60]!r} is no position; {FORM}.") from None
+            raise InputError(
+                f"{name}, line {n}: {line[:60]!r} is not a position; {FORM}."
+            ) from None
         rows.append([y, x] if turned else [x, y])
     return rows

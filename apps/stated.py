@@ -45,7 +45,9 @@ def resolve_decider(
     if path is None:
         return (model, planner), SayOptions(pointed=pointed, keep_out=kept, settings=settings)
     if model != "offline" or planner is not None:
-        raise InputError("--contract leaves nothing to decide; leave out --model and --planner.")
+        raise InputError(
+            "--contract leaves a model nothing to decide; leave out --model and --planner."
+        )
     contract, things = _read(path, pointed)
     known = {p.id for p in things} | {f"k{i}" for i in range(1, len(kept) + 1)}
     missing = [n for n in contract.target_ids if n not in known]
@@ -59,14 +61,14 @@ def resolve_decider(
         contract_in_pixels(contract, settings.metres_per_pixel or picture.metres_per_pixel)
     except ToolError:
         raise InputError(
-            f'The lengths of --contract {path} cannot be used; say "unit": "px" in it, or "m" for '
-            "a picture with --metres-per-pixel."
+            f'The lengths of --contract {path} cannot be used; set "unit": "px" in it, or "m" and '
+            "give --metres-per-pixel."
         ) from None
     fixed = (settings.clearance, settings.robot_radius) != (None, None)
     if fixed or settings.robots not in (None, contract.robots):
         raise InputError(
             f"-n, --clearance and --robot-radius cannot change --contract {path}, which is for "
-            f"{contract.robots} robots; leave them out, or write them there."
+            f"{contract.robots} robots; leave them out, or change the file."
         )
     given = SayOptions(pointed=things, keep_out=kept, settings=settings)
     return (StatedContract(contract), None), given
@@ -83,7 +85,7 @@ def _read(path: Path, pointed: Things) -> tuple[Contract, Things]:
         contract = Contract.model_validate_json(CANDIDATE.sub(lambda m: f'"{ids[m[1]]}"', text))
     except ValidationError as error:
         raise InputError(
-            f"--contract {path} is no contract: {violations(error)} "
-            "formup tools schema contract prints what it may hold."
+            f"--contract {path} is not a valid contract: {violations(error)} "
+            "formup tools schema contract prints the schema."
         ) from None
     return contract, (*pointed, *found)

@@ -57,7 +57,7 @@ class TerminalSession:
             if report.status not in ("question", "needs_approval"):
                 break
             asked = report.status == "question"
-            text = ask("your answer" if asked else "yes, or no and why")
+            text = ask("your answer" if asked else "yes, or no and the reason")
             if not text:
                 break
             approve = None if asked else text.lower() in ("y", "yes")

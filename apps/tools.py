@@ -5,7 +5,7 @@ import io
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -29,7 +29,7 @@ app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 @app.command("list")
 def list_tools(as_json: o.Json = False) -> None:
-    """The tools with what they do; with --json their JSON Schemas."""
+    """List the tools and what they do; with --json, their JSON Schemas."""
     if as_json:
         listed = [
             {"name": t.name, "description": t.description, "kind": t.kind, "parameters": t.schema}
@@ -42,8 +42,13 @@ def list_tools(as_json: o.Json = False) -> None:
 
 
 @app.command("schema")
-def print_schema(name: str) -> None:
-    """The JSON Schema (draft 2020-12) of `contract`, a file of a `fleet`, or a tool's arguments."""
+def print_schema(
+    name: Annotated[str, typer.Argument(help="contract, fleet, or the name of a tool.")],
+) -> None:
+    """Print the JSON Schema of a contract, a fleet file or a tool.
+
+    Of a tool, it is the schema of its arguments. The draft is 2020-12.
+    """
     schemas = {"contract": compact_schema(Contract), "fleet": fleet_schema()}
     schemas |= {t.name: t.schema for t in TOOLS}
     if name not in schemas:
@@ -53,14 +58,17 @@ def print_schema(name: str) -> None:
 
 @app.command("call")
 def call_tool(
-    name: str,
+    name: Annotated[str, typer.Argument(help="Name of the tool.")],
     image: o.PictureFile = None,
     args: o.Arguments = "{}",
     state: o.StateFile = None,
     picture: o.DrawnFile = None,
     metres_per_pixel: o.MetresPerPixel = None,
 ) -> None:
-    """Call one tool and print its answer; what it shows goes beside the state file or here."""
+    """Call one tool and print its answer as JSON.
+
+    Pictures it returns are written beside the state file, or to the current folder.
+    """
     tool = next((t for t in TOOLS if t.name == name), None)
     if tool is None:
         raise InputError(f"Unknown tool {name!r}. There are: {', '.join(t.name for t in TOOLS)}.")
@@ -128,7 +136,5 @@ def _context(image: Path | None, state: Path | None, settings: Settings) -> Cont
         stored = read_world(state)
         return Context.of(picture_of(stored, state, given), settings, stored.world)
     if given is None:
-        raise InputError(
-            "Name the picture with --image, or a state file that has one with --state."
-        )
+        raise InputError("Give a picture with --image, or a state file that has one with --state.")
     return Context.of(given, settings)

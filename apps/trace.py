@@ -24,14 +24,17 @@ COLUMN = 8
 
 
 def show_trace(file: o.TraceFile) -> None:
-    """Show a session step by step: what was said and called, times, tokens, cost, pictures."""
+    """Show a run step by step.
+
+    Prints messages, tool calls, times, tokens, cost and the files of pictures.
+    """
     root = log_path(file).parent
     pictures = FolderArtefacts(root / PICTURES)
 
     def where(sha256: str) -> str:
         return str(root / (pictures.name(sha256) or "missing"))
 
-    show_events(read_session(file), where, str(file), f"formup resume {file} goes on")
+    show_events(read_session(file), where, str(file), f"continue with formup resume {file}")
 
 
 def show_events(
@@ -50,7 +53,9 @@ def show_events(
     try:
         _show(where, how_on, *events)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError):
-        raise InputError(f"{name} is damaged; it is no whole session that formup wrote.") from None
+        raise InputError(
+            f"{name} is damaged; it is not a complete session written by formup."
+        ) from None
 
 
 def _show(where: Callable[[str], str], how_on: str, start: Event, *events: Event) -> None:

@@ -294,5 +294,5 @@ def _window() -> Window | None:
             return Window()
     except pygame.error as error:
         why = f"no window can be opened ({error})"
-    say(f"formup: {why}: watch the film among the files instead.", error=True)
+    say(f"formup: {why}; watch the film in the output folder instead.", error=True)
     return None

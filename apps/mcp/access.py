@@ -99,7 +99,7 @@ async def picture_named(ctx: Ctx, image: str) -> Picture:
             data = base64.b64decode(image.partition(",")[2], validate=True)
         except binascii.Error:
             raise InputError(
-                "That data URL cannot be read; give data:image/jpeg;base64, and the file in base64."
+                "The data URL cannot be read; give data:image/jpeg;base64, and the file in base64."
             ) from None
         return await asyncio.to_thread(checked_picture, data, "picture", hub)
     if folders:
@@ -110,9 +110,9 @@ async def picture_named(ctx: Ctx, image: str) -> Picture:
         if error.kind != "missing":
             raise
         raise InputError(
-            f"{image[:80]!r} is neither a data URL nor the id of a session of yours; files of the "
-            "server's machine cannot be named: send the picture with POST /api/sessions, and give "
-            "the id it answers."
+            f"{image[:80]!r} is neither a data URL nor the id of one of your sessions, and files "
+            "on the server cannot be opened; send the picture with POST /api/sessions, and give "
+            "the id that it returns."
         ) from None
 
 

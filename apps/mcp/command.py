@@ -21,11 +21,15 @@ if TYPE_CHECKING:
 NEEDED = "formup mcp needs an extra that is not installed: pip install 'formup[mcp]'."
 LIBRARIES = ("mcp", "mcp_types", "fastapi", "uvicorn", "prometheus_client")
 Http = Annotated[
-    bool, typer.Option("--http", help="Over HTTP instead, at /mcp: the same as formup serve.")
+    bool,
+    typer.Option("--http", help="Serve over HTTP instead, at /mcp, exactly as formup serve does."),
 ]
 Pictures = Annotated[
     list[Path] | None,
-    typer.Option(metavar="DIR", help="Whose pictures may be opened; by default this folder's."),
+    typer.Option(
+        metavar="DIR",
+        help="Folder whose pictures may be opened; default: the current folder; repeatable.",
+    ),
 ]
 
 
@@ -43,12 +47,12 @@ def mcp(
     prompts: o.PromptsFolder = None,
     limit: o.LimitList = None,
     policy: o.PolicyList = None,
-    fleet: Annotated[str | None, typer.Option(help="The robots of new sessions.")] = None,
+    fleet: serve.NewFleet = None,
     detector: o.DetectorName = None,
     segmenter: o.SegmenterName = None,
     threshold: o.Threshold = None,
 ) -> None:
-    """The team for a client of the Model Context Protocol, over stdio."""
+    """Serve the team to Model Context Protocol clients, over stdio."""
     try:
         from ..server.hub import Hub
         from ..server.metrics import Metrics
@@ -74,7 +78,7 @@ def mcp(
     folders = [folder.resolve() for folder in pictures or [Path()]]
     for folder in folders:
         if not folder.is_dir():
-            raise InputError(f"--pictures {folder} is no folder.")
+            raise InputError(f"--pictures {folder} is not a folder; give one that exists.")
     with serve.service_of(settings, planner, base_url, prompt, prompts, limit, policy) as service:
         hub = Hub(service, settings, Tokens(None), Metrics())
         raise typer.Exit(asyncio.run(_serve(hub, make_server(hub, folders).run_stdio_async())))

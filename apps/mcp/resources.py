@@ -14,19 +14,19 @@ JSON = "application/json"
 
 @with_error_messages
 async def scene(ctx: Ctx, session: str) -> bytes:
-    """The picture with rulers in px; what a question offers is outlined and numbered."""
+    """The picture with rulers in px; choices of a question are outlined and numbered."""
     return await asyncio.to_thread(view, await own_session(ctx, session))
 
 
 @with_error_messages
 async def plan(ctx: Ctx, session: str, plan_id: str) -> str:
-    """A plan with its contract, positions and certificate, and what it was made from."""
+    """A plan: contract, positions, certificate, and the plan that it was made from."""
     return plan_node(await own_session(ctx, session), plan_id).model_dump_json()
 
 
 @with_error_messages
 async def certificate(ctx: Ctx, session: str, plan_id: str) -> str:
-    """Whether a plan is as it was said to be: findings and measures."""
+    """Whether a plan meets its contract: findings and measures."""
     return plan_node(await own_session(ctx, session), plan_id).plan.verdict.model_dump_json()
 
 
@@ -38,7 +38,7 @@ async def plan_picture(ctx: Ctx, session: str, plan_id: str) -> bytes:
 
 @with_error_messages
 async def trace(ctx: Ctx, session: str) -> str:
-    """All that happened, an event a line."""
+    """All events, as JSON lines."""
     await own_session(ctx, session)
     events = await asyncio.to_thread(caller(ctx)[0].service.events, session)
     rows = ({"number": e.number, "kind": e.kind, "data": dict(e.data)} for e in events)
@@ -49,9 +49,9 @@ def formation(image: str, wish: str, robots: str = "as many as it takes") -> str
     """Bring a team of robots into a formation, step by step, with the person deciding."""
     return (
         f"Open the scene {image} with open_scene. Then have robots placed with instruct, in my own "
-        f"words: {wish!r}; robots: {robots}. Show me each message and picture as they are. Where "
-        "something is asked, ask me, and give my answer to instruct. When I say that it is right, "
-        "and not before, call approve_and_deploy with that plan_id, and status until they arrived."
+        f"words: {wish!r}; robots: {robots}. Show me each message and picture unchanged. If there "
+        "is a question, ask me, and pass my answer to instruct. Only when I say that it is right, "
+        "call approve_and_deploy with that plan_id, then status until the robots have arrived."
     )
 
 

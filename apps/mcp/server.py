@@ -22,10 +22,10 @@ from .resources import add_resources
 from .tools import add_tools
 
 INSTRUCTIONS = (
-    "Places a team of robots in a picture by what a person says, proves the placement, and drives "
-    "there. open_scene first; then instruct with the person's own words, which it reads itself: do "
-    "not compute positions. Show its messages and questions to the person. Robots move by "
-    "approve_and_deploy alone; stop holds them at once."
+    "Places a team of robots in a picture as a person says, proves the placement, and drives them "
+    "there. Call open_scene, then instruct with the person's own words, which it interprets: do "
+    "not compute positions. Show its messages and questions to the person. Only "
+    "approve_and_deploy moves robots; stop holds them at once."
 )
 
 

@@ -25,12 +25,12 @@ JPEG = "image/jpeg"
 
 
 class State(BaseModel):
-    """A session as it stands.
+    """State of a session.
 
-    Status open: nothing was said yet. running: ask status again. question: answer with instruct.
-    needs_approval: a person has to say yes. The message is for the person, as it is. certified:
-    whether the plan is proven to be as said. candidates: what a question offers. detail, on
-    demand: contract, positions in px in robot order, certificate, arrival.
+    Status open: nothing was said yet. running: call status again. question: answer with instruct.
+    needs_approval: a person must approve. Show the message to the person unchanged. certified:
+    whether the plan is proven as asked. candidates: choices of a question. detail, on demand:
+    contract, positions in px in robot order, certificate, arrival.
     """
 
     session: str
@@ -94,7 +94,7 @@ async def session_state(
     if now is not None or await asyncio.to_thread(service.is_written, session):
         driving = now is not None and now.moving.is_set()
         doing = "The robots are driving" if driving else "A turn is under way"
-        state = State(session=session, status="running", message=f"{doing}; ask status again.")
+        state = State(session=session, status="running", message=f"{doing}; call status again.")
     elif held.run is None:
         size = "{} by {} px".format(*held.picture.size)
         message = f"The picture is open, {size}. Say what to do with instruct."
@@ -153,8 +153,8 @@ def plan_node(held: Session, plan_id: str) -> Any:
     """
     plans = {} if held.run is None else held.run.world.plans
     if plan_id not in plans:
-        known = ", ".join(list(plans)[-8:]) or "none yet"
+        known = ", ".join(list(plans)[-8:]) or "none"
         raise InputError(
-            f"There is no plan {plan_id!r} in this session; there is {known}.", "missing"
+            f"There is no plan {plan_id!r} in this session; its latest plans: {known}.", "missing"
         )
     return plans[plan_id]

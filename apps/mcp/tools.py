@@ -30,17 +30,17 @@ from .access import Access, Ctx, authorize, caller, picture_named, with_error_me
 from .state import StateResult, await_turn, plan_node, session_state, state_after
 
 NO_GO = (
-    "Nothing was done: words move no robots here. Say it without the go, and have the certified "
-    "plan driven with approve_and_deploy."
+    "Nothing was done: words move no robots here. Leave out the go, then drive the certified "
+    "plan with approve_and_deploy."
 )
 NO_FORM = "This client cannot ask a person: let one approve the plan with "
-OVER_HTTP = f"{NO_FORM}POST /api/sessions/{{}}/approvals; then ask status. "
+OVER_HTTP = f"{NO_FORM}POST /api/sessions/{{}}/approvals; then call status. "
 OVER_STDIO = f"{NO_FORM}/approve in formup chat --session {{}}, once this client has ended. "
-ASession = Annotated[str, Field(max_length=100, description="as open_scene gave it")]
-AKey = Annotated[Key, Field(description="of your choice, the same when you repeat this very call")]
+ASession = Annotated[str, Field(max_length=100, description="id from open_scene")]
+AKey = Annotated[Key, Field(description="of your choice; reuse it only to repeat this very call")]
 Detail = Annotated[bool, Field(description="also contract, positions, certificate, arrival")]
-Shown = Annotated[bool, Field(description="also the picture of what stands")]
-Things = Annotated[Pointed, Field(description="things meant, pointed at in px of the picture")]
+Shown = Annotated[bool, Field(description="also the current picture")]
+Things = Annotated[Pointed, Field(description="targets, pointed at in px of the picture")]
 Answer = AcceptedElicitation[Any] | DeclinedElicitation | CancelledElicitation
 Edits = Annotated[
     list[Annotated[dict[str, Any], WithJsonSchema(EDIT_SCHEMA)]], Field(min_length=1, max_length=20)
@@ -50,14 +50,14 @@ Edits = Annotated[
 @with_error_messages
 async def open_scene(
     ctx: Ctx,
-    image: Annotated[str, Field(description="path of a file, or over HTTP an id; or a data URL")],
+    image: Annotated[str, Field(description="file path, over HTTP a session id; or a data URL")],
     robots: Annotated[int | None, Field(ge=1, le=10_000)] = None,
     metres_per_pixel: Annotated[float | None, Field(gt=0, le=1e6)] = None,
     robot_radius: Annotated[float | None, Field(ge=0, le=1e5, description="px")] = None,
     clearance: Annotated[float | None, Field(ge=0, le=1e5, description="px")] = None,
     picture: Shown = False,
 ) -> StateResult:
-    """Begin a session about a picture taken from above; everything else needs its id."""
+    """Begin a session about a picture taken from above; other tools need its id."""
     hub, person = caller(ctx)
     require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
@@ -83,7 +83,7 @@ async def instruct(
     detail: Detail = False,
     picture: Shown = False,
 ) -> StateResult:
-    """Say in the person's own words what the team shall do or change; also questions and answers.
+    """Tell the team, in the person's own words, what to do or change; also questions and answers.
 
     It plans and certifies; no robot moves. "Surround the coin with 6 robots", "a bit further out",
     "undo", "how far is robot 4?".
@@ -108,7 +108,7 @@ async def edit(
     detail: Detail = False,
     picture: Shown = False,
 ) -> StateResult:
-    """Change the plan that stands exactly, without words; what is not named stays as it is."""
+    """Change the current plan by exact edits, without words; all else stays as it is."""
     service, person = await authorize(ctx, session, "plan")
     asked = Asked(by=person.name, key=idempotency_key, may_move=False)
     turn = service.edit(session, *edits, asked=asked)
@@ -119,11 +119,11 @@ async def edit(
 async def status(
     ctx: Ctx,
     session: ASession,
-    wait: Annotated[bool, Field(description="for some seconds, for the end of what runs")] = False,
+    wait: Annotated[bool, Field(description="wait some seconds for the turn to end")] = False,
     detail: Detail = False,
     picture: Shown = False,
 ) -> StateResult:
-    """How a session stands: its plan, what waits for a person, whether robots drive or arrived."""
+    """State of a session: its plan, what waits for a person, whether robots drive or arrived."""
     service, _ = await authorize(ctx, session)
     turn = service.turn(session)
     if wait and turn is not None:
@@ -185,9 +185,9 @@ async def approve_and_deploy(
     idempotency_key: AKey,
     answer: Annotated[Answer, Resolve(ask_person)],
 ) -> StateResult:
-    """Drive the robots to a certified plan. Real ones only after a person said yes, who is asked.
+    """Drive the robots to a certified plan; for real ones, a person is asked to approve first.
 
-    Robots that still drive after some seconds: status "running", then ask status.
+    If they still drive after some seconds: status "running"; call status again.
     """
     said = answer.data if isinstance(answer, AcceptedElicitation) else None
     if isinstance(said, str):
@@ -206,7 +206,7 @@ async def approve_and_deploy(
 
 @with_error_messages
 async def stop(ctx: Ctx, session: ASession) -> StateResult:
-    """Hold all robots at once where they are, and end what runs."""
+    """Hold all robots where they are, at once, and end the turn."""
     service, person = await authorize(ctx, session)
     await service.stop(session, asked_by(person))
     return await session_state(ctx, session)

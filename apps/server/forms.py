@@ -22,7 +22,7 @@ class Form(BaseModel):
 
 
 class Message(Form):
-    """What a person says, and points at with it."""
+    """A message from a person, with the things they point at."""
 
     words: Words
     pointed: Pointed = ()
@@ -30,58 +30,58 @@ class Message(Form):
 
 
 class Edits(Form):
-    """Edits as the tool `edit_formation` takes them, done in order."""
+    """Edits in the format of the tool `edit_formation`, applied in order."""
 
     edits: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=20)]
 
 
 class Preview(Form):
-    """Edits to try on a plan, the one that stands by default."""
+    """Edits to try on a plan, by default the current one."""
 
     edits: Annotated[tuple[Edit, ...], Field(min_length=1, max_length=20)]
     plan_id: Annotated[str | None, Field(max_length=100)] = None
 
 
 class Pointing(Form):
-    """What a person points at."""
+    """A thing that a person points at."""
 
     prompt: TargetPrompt
 
 
 class Undo(Form):
-    """How many steps back, below 0 forward; or to which plan, or `first`."""
+    """Steps to go back, or forward if negative; or the id of the plan to go back to, or `first`."""
 
     steps: Annotated[int, Field(ge=-1000, le=1000)] = 1
     to: Annotated[str | None, Field(max_length=100)] = None
 
 
 class Deployment(Form):
-    """Which plan the robots are to move to."""
+    """The plan to move the robots to."""
 
     plan_id: Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class Approval(Form):
-    """A yes to exactly what waits, with the nonce that `waits` gave."""
+    """Approval of exactly the plan that waits, with the nonce from `waits`."""
 
     plan_id: Annotated[str, Field(min_length=1, max_length=100)]
     nonce: Annotated[str, Field(min_length=1, max_length=100)]
 
 
 class Fork(Form):
-    """After how many turns; all by default."""
+    """Number of turns to copy; all by default."""
 
     turn: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
 
 
 class Name(Form):
-    """What a session is called."""
+    """The new name of a session."""
 
     name: Annotated[str, Field(max_length=200)]
 
 
 class Waits(BaseModel):
-    """What waits for a person's yes, and the nonce which that has to name."""
+    """What waits for a person's approval, and the nonce that the approval must contain."""
 
     plan_id: str | None
     nonce: str
@@ -96,12 +96,12 @@ class Waits(BaseModel):
 
 
 class TurnState(BaseModel):
-    """A turn: under way, or what came of it.
+    """A turn, running or finished.
 
     Attributes:
-        turn: number of the event that began it; 0 where none has yet.
-        status: as in the report, or running, or interrupted: its process ended before it did.
-        report: whole for the session's last turn.
+        turn: the number of the event that began it; 0 if nothing has begun.
+        status: as in the report; or `running`; or `interrupted`, if its process ended first.
+        report: only for the session's last turn.
     """
 
     turn: int
@@ -127,12 +127,12 @@ class TurnState(BaseModel):
 
 
 class Outlined(BaseModel):
-    """An outline as it would be measured.
+    """The outline of a thing, as a turn would measure it.
 
     Attributes:
-        rings: around it and around its holes, closed, px.
-        confidence: alpha; `sound` where it reaches `threshold`.
-        doubtful: whether somebody should look at it before robots are sent there.
+        rings: the closed boundaries of the thing and of its holes, px.
+        confidence: from 0 to 1; `sound` if it reaches `threshold`.
+        doubtful: whether a person should check it before robots are sent there.
     """
 
     id: str
@@ -145,7 +145,7 @@ class Outlined(BaseModel):
 
 
 class Shared(BaseModel):
-    """A code that lets others look at a session."""
+    """A code that gives others read-only access to a session."""
 
     code: str
 
@@ -162,13 +162,14 @@ class SessionFacts(BaseModel):
 
 
 class SessionState(BaseModel):
-    """A session as it stands.
+    """The current state of a session.
 
     Attributes:
-        events: the number of its last event; event streams go on from there.
-        under_way: the turn that runs in this process.
-        last: what came of the last turn.
-        plans: ids of all plans, oldest first; `current` is what changes apply to.
+        events: the number of its last event, after which an event stream can continue.
+        under_way: the turn that is running in this process.
+        last: the report of the last turn.
+        waits: what waits for an approval.
+        plans: ids of all plans, oldest first; changes apply to `current`.
     """
 
     id: str
@@ -182,14 +183,14 @@ class SessionState(BaseModel):
 
 
 class AgentFacts(BaseModel):
-    """Who decides in a session."""
+    """An agent that can decide in sessions, and its model."""
 
     name: str
     model: str
 
 
 class ErrorFacts(BaseModel):
-    """What was wrong."""
+    """What went wrong."""
 
     message: str
     type: Literal["invalid_request_error", "server_error"]
@@ -198,6 +199,6 @@ class ErrorFacts(BaseModel):
 
 
 class Error(BaseModel):
-    """How every error is told."""
+    """The body of every error response."""
 
     error: ErrorFacts

@@ -86,7 +86,7 @@ class Guard:
         there = f"/api/sessions/{person.sees}"
         inside = path == there or path.startswith(f"{there}/")
         if person.sees and not (method in SAFE and inside):
-            raise _RefusedError(403, "A shared link shows one session, and lets do nothing else.")
+            raise _RefusedError(403, "A shared link shows one session and allows nothing else.")
 
         def look() -> None:
             nonlocal looks
@@ -114,7 +114,7 @@ class Guard:
         mine = LOOPBACK | {settings.host} | set(_parts(settings.hosts))
         if name not in mine and (settings.hosts or not self._hub.tokens.needed):
             raise _RefusedError(
-                421, f"This server is not called {name!r}; FORMUP_HOSTS lists its other names."
+                421, f"This server has no host name {name!r}; FORMUP_HOSTS lists its other names."
             )
         origin = headers.get("origin")
         if origin is None and headers.get("sec-fetch-site") in (None, "same-origin", "none"):
@@ -122,14 +122,16 @@ class Guard:
         same = origin is not None and _parsed_address(origin).netloc == host
         if not same and origin not in _parts(settings.origins) and method not in SAFE:
             raise _RefusedError(
-                403, f"Pages of {origin or 'another site'} may not call this; see FORMUP_ORIGINS."
+                403,
+                f"Pages of {origin or 'another site'} may not call this server; FORMUP_ORIGINS "
+                "lists those that may.",
             )
 
     def _person(self, path: str, headers: Headers) -> Person:
         kind, _, token = headers.get("authorization", "").partition(" ")
         if kind.lower() == "share" and not _is_open(path):
             if (looking := self._hub.tokens.looking(token.strip())) is None:
-                raise _RefusedError(401, "This link does not hold any more: ask for another.")
+                raise _RefusedError(401, "This link is no longer valid; ask for another.")
             return looking
         if _is_open(path) or not self._hub.tokens.needed:
             return Person()
@@ -148,8 +150,8 @@ class Guard:
             recent.popleft()
         if len(recent) >= settings.requests_per_minute or running[name] >= settings.requests:
             raise InputError(
-                f"That is too much at once: {settings.requests} requests at a time and "
-                f"{settings.requests_per_minute} in a minute are allowed; wait a moment.",
+                f"Too many requests: at most {settings.requests} at a time and "
+                f"{settings.requests_per_minute} per minute are allowed; wait a moment.",
                 "too_many",
             )
         recent.append(now)

@@ -11,15 +11,15 @@ from .hub import AHub, APerson
 router = APIRouter(tags=["operations"])
 
 
-@router.get("/health/live", summary="Whether the process answers")
+@router.get("/health/live", summary="Check that the process answers")
 async def live() -> dict[str, str]:
-    """Whether the process answers."""
+    """Check that the process answers."""
     return {"status": "ok"}
 
 
-@router.get("/health/ready", responses={503: {"description": "It is not ready"}})
+@router.get("/health/ready", responses={503: {"description": "The server is not ready"}})
 async def ready(hub: AHub) -> JSONResponse:
-    """Whether it takes requests: the store can be used, and it is not about to end."""
+    """Check that the server takes requests: its store works and it is not shutting down."""
     if hub.leaving:
         return JSONResponse({"status": "leaving"}, 503)
     try:
@@ -31,7 +31,7 @@ async def ready(hub: AHub) -> JSONResponse:
 
 @router.get("/metrics", response_class=Response)
 async def metrics(hub: AHub, person: APerson) -> Response:
-    """Figures in the text format of Prometheus."""
+    """Get metrics in the text format of Prometheus."""
     from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
     return Response(generate_latest(hub.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -29,12 +29,14 @@ class Metrics:
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)  # CPU and memory, where the system has them
         here, by = self.registry, ["status"]
-        self.turns = Counter("formup_turns", "Turns by what came of them.", by, registry=here)
+        self.turns = Counter("formup_turns", "Turns by status.", by, registry=here)
         self.seconds = Histogram(
-            "formup_turn_seconds", "Time of a turn.", buckets=SECONDS, registry=here
+            "formup_turn_seconds", "Duration of a turn.", buckets=SECONDS, registry=here
         )
-        self.streams = Gauge("formup_event_streams", "Event streams now.", registry=here)
-        self.refused = Counter("formup_requests_refused", "By HTTP status.", by, registry=here)
+        self.streams = Gauge("formup_event_streams", "Open event streams.", registry=here)
+        self.refused = Counter(
+            "formup_requests_refused", "Refused requests by HTTP status.", by, registry=here
+        )
 
     def answered(self, status: int) -> None:
         """Count a response if it refuses a request; status 0 is a later part of a response."""

@@ -40,16 +40,22 @@ NEEDED = (
     "say for example *Surround the largest coin with 6 robots*."
 )
 EMPTY = "Say what to do, such as *a bit further out*, *undo* or *go*."
-BUSY = "I am still at what you said before. Wait a moment and say it again, or say **stop**."
+BUSY = (
+    "I am still working on your last message. Wait a moment and send this one again, or say "
+    "**stop**."
+)
 ON_THE_WAY = (
-    "The robots are on their way, and it takes a while. Say **stop** to hold them where they are; "
-    "*are they there?* tells how far they are."
+    "The robots are on their way, which takes a while. Say **stop** to hold them where they "
+    "are, or ask *are they there?* to see how far they are."
 )
 DRIVES = "The robots are still on their way. Wait for them, or say **stop** to hold them."
 CUT_OFF = "That was stopped before it began; nothing was done."
-BROKEN_OFF = "That was broken off before its end; robots that drove are held. Say what to do next."
+BROKEN_OFF = (
+    "That was interrupted before it was finished; robots that were driving are held. Say what to "
+    "do next."
+)
 NOTHING_MOVES = (
-    "No robots of this chat move. Real robots of this server are held, whoever drove them."
+    "No robots of this chat are moving. Real robots of this server are held, whoever drove them."
 )
 DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
@@ -118,7 +124,7 @@ def problem(error: Exception) -> str:
     if isinstance(error, FormupError):
         return str(error)
     logging.getLogger("formup").error("a turn broke", exc_info=error)
-    return "The server failed at this; its log says why."
+    return "The server failed to do this; its log says why."
 
 
 def base_of(request: Request, hub: Hub) -> str:
@@ -144,7 +150,7 @@ async def begin(hub: Hub, person: Person, request: ChatRequest, base: str) -> An
     if request.model not in agents(hub):
         there = ", ".join(agents(hub))
         raise InputError(
-            f"There is no model {request.model[:80]!r} here; there is {there}.", "missing"
+            f"There is no model {request.model[:80]!r} here; use one of {there}.", "missing"
         )
     if (answer := chore(request)) is not None:
         return Answer(answer)
@@ -294,20 +300,22 @@ def _data(address: str) -> bytes:
     if head is None:
         shown = address[:60] or "a file's id"
         raise InputError(
-            f"The picture is given as {shown!r}, and nothing is fetched; attach the file itself, "
-            "as a data URL (data:image/png;base64,...)."
+            f"The picture is given as {shown!r}, but this server fetches nothing; attach the file "
+            "itself, as a data URL (data:image/png;base64,...)."
         )
     try:
         return base64.b64decode(address[head.end() :], validate=True)
     except ValueError:
-        raise InputError("The picture's data URL is no valid base64; attach it again.") from None
+        raise InputError(
+            "The picture's data URL is not valid base64; attach the picture again."
+        ) from None
 
 
 def _check(message: Message) -> None:
     """Refuse parts of a message that would otherwise be silently ignored."""
     if message.others:
         raise InputError(
-            f"A message may hold text and a picture; this one holds {message.others[0][:40]!r}."
+            f"A message may contain text and a picture; leave out {message.others[0][:40]!r}."
         )
     if len(message.pictures) > 1:
         raise InputError(

@@ -24,13 +24,13 @@ FOREVER = "private, max-age=31536000, immutable"
 
 @router.get("/models")
 async def models(hub: AHub, person: APerson) -> dict[str, Any]:
-    """Who can decide, as models."""
+    """List the agents, as models."""
     return {"object": "list", "data": [_model_facts(name) for name in agents(hub)]}
 
 
 @router.get("/models/{name:path}")
 async def model(name: str, hub: AHub, person: APerson) -> dict[str, Any]:
-    """One of them."""
+    """Get one of the models."""
     if name not in agents(hub):
         raise InputError(f"There is no model {name[:80]!r} here.", "missing")
     return _model_facts(name)
@@ -38,7 +38,7 @@ async def model(name: str, hub: AHub, person: APerson) -> dict[str, Any]:
 
 @router.post("/chat/completions")
 async def complete(body: ChatBody, request: Request, hub: AHub, person: APerson) -> Response:
-    """Answer what the person says last in a conversation."""
+    """Answer the last message of a conversation."""
     base = base_of(request, hub)
     begun = await begin(hub, person, parse_request(body, request.headers), base)
     facts = {"id": _id(begun), "created": int(time.time()), "model": body.model}
@@ -63,8 +63,9 @@ async def picture(
     sha256: Annotated[str, Path(pattern="^[0-9a-f]{64}$")],
     hub: AHub,
 ) -> Response:
-    """The picture of an answer, without a token: whoever knows its hash was given the address, or
-    has the picture.
+    """Get the picture of an answer.
+
+    No token is needed: whoever knows its hash was given the address, or has the picture.
     """
     try:
         files = hub.service.store.open(session).artefacts

@@ -47,8 +47,8 @@ TITLE = re.compile(r"\b(title|name)\b|title_", re.I)
 SPOKEN = re.compile(r"^\W*(?:user|human)\W*?: *(\S.*)$", re.I | re.M)
 HISTORY = re.compile(r"<chat_history>|^\W*(?:user|human)\W*?:", re.I | re.M)
 NOTHING = (
-    "That reads like a request of the chat program, not of a person, so nothing was done; "
-    "say it in other words if robots are meant."
+    "That looks like a request of the chat program, not of a person, so nothing was done; "
+    "rephrase it if it was meant for the robots."
 )
 
 

@@ -157,7 +157,7 @@ async def _events(hub: Hub, session: str) -> tuple[Event, ...]:
     with suppress(StorageError):
         return await asyncio.to_thread(hub.service.events, session)
     raise InputError(
-        f"The session {session!r} of this chat is not there any more; begin a new chat.", "missing"
+        f"The session {session!r} of this chat no longer exists; begin a new chat.", "missing"
     )
 
 

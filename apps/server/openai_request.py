@@ -46,7 +46,7 @@ class Part(BaseModel):
 
 
 class Message(BaseModel):
-    """A message, or another item of a history, which has no role."""
+    """A message, or an item of a history that has no role."""
 
     role: str = ""
     content: str | list[Part] | None = None
@@ -160,7 +160,9 @@ def parse_request(body: ChatBody | ResponsesBody, headers: Mapping[str, str]) ->
         place = Place(session, 0)
     users = tuple(m for m in messages if m.role == "user")
     if not users:
-        raise InputError("The request holds no message of role user; give what the person says.")
+        raise InputError(
+            "The request has no message of role user; add one with what the person says."
+        )
     facts = {k: str(v) for k, v in (body.metadata or {}).items()}
     chat = facts.get("chat_id") or facts.get("conversation_id")
     return ChatRequest(
@@ -198,12 +200,14 @@ def digest(*parts: object) -> str:
     try:
         return hashlib.sha256(to_json(given)).hexdigest()[:32]
     except PydanticSerializationError:
-        raise InputError("What was sent is no text in parts; leave these out.") from None
+        raise InputError("Parts of the request are not valid text; leave them out.") from None
 
 
 def _check(body: Body) -> None:
     """Refuse options that would otherwise be silently ignored."""
     if (body.n or 1) > 1:
-        raise InputError(f"n is {body.n}; there is one answer to a message: leave n out, or 1.")
+        raise InputError(
+            f"n is {body.n}; only one answer per message is supported: leave out n, or set 1."
+        )
     if body.audio or "audio" in (body.modalities or ()):
-        raise InputError("Audio cannot be answered with; ask for text alone.")
+        raise InputError("Audio answers are not supported; ask for text only.")

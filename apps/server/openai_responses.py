@@ -21,7 +21,7 @@ router = APIRouter(prefix="/v1", tags=["openai"], responses=ERRORS)
 
 @router.post("/responses")
 async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APerson) -> Response:
-    """Answer what the person says."""
+    """Answer a message."""
     asked = parse_request(body, request.headers)
     begun = await begin(hub, person, asked, base_of(request, hub))
     facts = _response(begun, body.model) | {"previous_response_id": body.previous_response_id}
@@ -32,8 +32,9 @@ async def respond(body: ResponsesBody, request: Request, hub: AHub, person: APer
 
 @router.get("/responses/{response}")
 async def again(response: str, request: Request, hub: AHub, person: APerson) -> Response:
-    """A response that was given, told anew from its session; chores and requests for a picture
-    leave none.
+    """Get an earlier response, rebuilt from its session.
+
+    Answers to a client's own chores, such as titles, and requests for a picture are not kept.
     """
     place = place_of(response)
     if place is None:

@@ -68,7 +68,7 @@ def run(service: Service, settings: ServerSettings) -> int:
         server.run()
     except SystemExit:  # uvicorn exits if it cannot listen; its log says why
         where = f"{settings.host}:{settings.port}"
-        raise InputError(f"{where} cannot be listened on: give another --port or --host.") from None
+        raise InputError(f"Cannot listen on {where}; give another --port or --host.") from None
     return 0 if server.started else 4
 
 

@@ -38,7 +38,7 @@ async def _session(hub: Hub, name: str, person: Person) -> Session:
 
 @router.get("/picture", response_class=Response, responses={200: {"content": {"image/jpeg": {}}}})
 async def picture(session: str, hub: AHub, person: APerson) -> Response:
-    """The picture as it stands in the session, upright, as JPEG, at most 2,048 px long."""
+    """Get the session's current picture, upright, as JPEG of at most 2,048 px a side."""
     held = await hub.service.fresh(await check_seen(hub, session, person))
     shown = held.context.picture
     data = await asyncio.to_thread(_jpeg, shown)
@@ -59,7 +59,7 @@ async def scene(
     person: APerson,
     plan: Annotated[str | None, Query(max_length=100)] = None,
 ) -> dict[str, Any]:
-    """Outlines, robots and a plan with its certificate, px; the plan that stands by default."""
+    """Get outlines, robots and a plan with its certificate, in px; by default the current plan."""
     held = await hub.service.fresh(await check_seen(hub, session, person))
     world = held.context.world
     if plan is not None and plan not in world.plans:
@@ -71,7 +71,7 @@ async def scene(
 async def paths(
     session: str, plan_id: str, hub: AHub, person: APerson
 ) -> dict[str, list[list[float]]]:
-    """How robots would get to a plan from where they were seen, px by their ids."""
+    """Get each robot's path to a plan from where it was last observed, in px by robot id."""
     context = (await hub.service.fresh(await check_seen(hub, session, person))).context
     if plan_id not in context.world.plans:
         raise InputError(f"There is no plan {plan_id!r} in this session.", "missing")
@@ -85,14 +85,14 @@ async def paths(
 
 @router.get("/things")
 async def things(session: str, hub: AHub, person: APerson) -> list[dict[str, Any]]:
-    """The things that stand out in the picture; looked for once, which the first turn needs too."""
+    """List the things that stand out in the picture; turns reuse what is detected here."""
     context = (await _session(hub, session, person)).context
     return candidate_data(await asyncio.to_thread(context.candidates))
 
 
 @router.post("/outline")
 async def outline(session: str, pointing: Pointing, hub: AHub, person: APerson) -> Outlined:
-    """The outline of what is pointed at, and how sure it is; nothing is decided by it."""
+    """Measure the outline of what is pointed at, with its confidence; changes nothing."""
     require_scope(person, "plan")
     context = (await _session(hub, session, person)).context
     try:
@@ -111,7 +111,7 @@ async def outline(session: str, pointing: Pointing, hub: AHub, person: APerson) 
 
 @router.post("/preview")
 async def preview(session: str, wanted: Preview, hub: AHub, person: APerson) -> dict[str, Any]:
-    """What edits would make of a plan: places, and what its certificate would say."""
+    """Preview edits of a plan: the robots' places and the certificate; changes nothing."""
     require_scope(person, "plan")
     world = (await _session(hub, session, person)).context.world
     try:

@@ -19,15 +19,21 @@ from .hub import AHub, APerson, Hub, check_owner, check_seen, require_scope
 from .tokens import Person
 
 ERRORS: dict[int | str, dict[str, Any]] = {
-    401: {"model": Error, "description": "No token, or none of this server's"},
-    403: {"model": Error, "description": "The token may not do that, or a page of another origin"},
-    404: {"model": Error, "description": "There is none, or it is another token's"},
+    401: {"model": Error, "description": "The token is missing or unknown"},
+    403: {
+        "model": Error,
+        "description": "Not allowed for this token, or for pages of another origin",
+    },
+    404: {"model": Error, "description": "Not found, or it belongs to another token"},
     408: {"model": Error, "description": "The request did not arrive in time"},
-    409: {"model": Error, "description": "A turn is under way, or something else was done before"},
-    413: {"model": Error, "description": "Larger than is allowed"},
-    421: {"model": Error, "description": "The server is not called that"},
-    422: {"model": Error, "description": "Something given cannot be used; the message says what"},
-    429: {"model": Error, "description": "Too many requests"},
+    409: {
+        "model": Error,
+        "description": "A turn is running, or the request conflicts with what was done before",
+    },
+    413: {"model": Error, "description": "The request or its picture is too large"},
+    421: {"model": Error, "description": "The server does not answer to this host name"},
+    422: {"model": Error, "description": "The input is not valid; the message says why"},
+    429: {"model": Error, "description": "Too many requests, sessions or event streams"},
     500: {"model": Error, "description": "The store cannot be used"},
 }
 PICTURE = {
@@ -64,7 +70,8 @@ def checked_picture(data: bytes, name: str, hub: Hub) -> Picture:
         width = height = 0  # the decoder below raises the error
     if width * height > hub.settings.pixels:
         raise InputError(
-            f"The picture has {width} by {height} pixels; {hub.settings.pixels:,} are allowed.",
+            f"The picture has {width} by {height} pixels; at most {hub.settings.pixels:,} are "
+            "allowed.",
             "too_large",
         )
     return picture_from_bytes(data, name)
@@ -72,7 +79,7 @@ def checked_picture(data: bytes, name: str, hub: Hub) -> Picture:
 
 @router.get("/agents")
 async def agents(hub: AHub, person: APerson) -> list[AgentFacts]:
-    """Who can decide in a session; the first is the usual one."""
+    """List the agents that can decide in a session; the first is the default."""
     found = hub.service.agents.items()
     return [AgentFacts(name=name, model=agent.model.name) for name, agent in found]
 
@@ -90,7 +97,7 @@ async def begin(
     clearance: Annotated[float | None, Query(ge=0, le=1e5)] = None,
     seed: Annotated[int, Query(ge=0, le=2**31)] = 0,
 ) -> SessionState:
-    """Begin a session about the picture that is the body."""
+    """Begin a session about the picture in the request body."""
     require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     picture = await picture_sent(request, hub, name or "picture")
@@ -117,7 +124,7 @@ def check_room(hub: Hub, person: Person) -> None:
     """
     number, most = len(owned(hub, person)), hub.settings.sessions
     if number >= most:
-        raise InputError(f"You have {number} sessions, of {most} allowed; delete some.", "too_many")
+        raise InputError(f"You have {number} of {most} allowed sessions; delete some.", "too_many")
 
 
 def owned(
@@ -138,14 +145,14 @@ def owned(
 async def listed(
     hub: AHub, person: APerson, text: Annotated[str, Query(max_length=200)] = ""
 ) -> list[SessionFacts]:
-    """Your sessions, the newest first; for those who approve also where something waits."""
+    """List your sessions, newest first; with scope `approve`, also those that wait for approval."""
     waiting = hub.service.waiting() if person.may("approve") else ()
     return await asyncio.to_thread(owned, hub, person, text, waiting)
 
 
 @router.get("/sessions/{session}")
 async def state(session: str, hub: AHub, person: APerson) -> SessionState:
-    """A session as it stands."""
+    """Get the current state of a session."""
     return await state_of(hub, await check_seen(hub, session, person))
 
 
@@ -174,7 +181,7 @@ async def state_of(hub: Hub, session: str) -> SessionState:
 
 @router.patch("/sessions/{session}")
 async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionState:
-    """Call a session otherwise."""
+    """Rename a session."""
     require_scope(person, "plan")
     mine = check_owner(session, person)
     await asyncio.to_thread(hub.service.store.rename, mine, to.name)
@@ -183,14 +190,14 @@ async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionS
 
 @router.delete("/sessions/{session}", status_code=204)
 async def delete(session: str, hub: AHub, person: APerson) -> None:
-    """Hold its robots, and delete a session with all that was said in it."""
+    """Hold a session's robots, and delete the session with all its content."""
     require_scope(person, "plan")
     await hub.service.delete(check_owner(session, person))
 
 
 @router.post("/sessions/{session}/forks", status_code=201)
 async def fork(session: str, at: Fork, hub: AHub, person: APerson) -> SessionState:
-    """A session of its own that begins as this one did."""
+    """Copy a session, up to a turn, into a new one."""
     require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     mine = check_owner(session, person)
@@ -199,7 +206,7 @@ async def fork(session: str, at: Fork, hub: AHub, person: APerson) -> SessionSta
 
 @router.get("/sessions/{session}/plans/{plan_id}")
 async def plan(session: str, plan_id: str, hub: AHub, person: APerson) -> dict[str, Any]:
-    """A plan with its certificate, and what it was made from."""
+    """Get a plan with its certificate and the plan that it was made from."""
     run = await _run_with(session, plan_id, hub, person)
     void = run.world.is_void(run.world.plans[plan_id].plan)
     return {**run.world.plans[plan_id].model_dump(mode="json"), "void": void}
@@ -211,7 +218,7 @@ async def plan(session: str, plan_id: str, hub: AHub, person: APerson) -> dict[s
     responses={200: {"content": {"image/png": {}}}},
 )
 async def plan_picture(session: str, plan_id: str, hub: AHub, person: APerson) -> Response:
-    """A plan, drawn on the picture, as PNG."""
+    """Get a plan drawn on the picture, as PNG."""
     run = await _run_with(session, plan_id, hub, person)
     node, file = run.world.plans[plan_id], io.BytesIO()
     drawn = await asyncio.to_thread(
@@ -239,7 +246,7 @@ async def artefact(
     hub: AHub,
     person: APerson,
 ) -> Response:
-    """A file that events name by its hash: pictures, and the tracks of robots on their way."""
+    """Get a file that events name by its hash: a picture, or the recorded tracks of robots."""
     files = hub.service.store.open(check_owner(session, person)).artefacts
     if sha256 not in files:
         raise InputError(f"There is no file {sha256[:16]} in this session.", "missing")

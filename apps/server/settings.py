@@ -19,59 +19,66 @@ class ServerSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     host: str = Field(
-        default="127.0.0.1", description="address to listen on; beyond loopback it wants tokens"
+        default="127.0.0.1", description="address to listen on; any but loopback requires tokens"
     )
     port: int = Field(
-        default=8734, ge=0, le=65535, description="port to listen on; 0 takes a free one"
+        default=8734, ge=0, le=65535, description="port to listen on; 0 picks a free one"
     )
     store: str | None = Field(
         default=None,
-        description="where sessions are kept: a folder, sqlite:///FILE or postgresql://...",
+        description="where sessions are stored: a folder, sqlite:///FILE or postgresql://...",
     )
     tokens_file: Path | None = Field(
-        default=None, description="file with hashed tokens, as `formup tokens` writes it"
+        default=None, description="file of hashed tokens, as `formup tokens` writes it"
     )
     model: str = Field(
-        default="offline", description="who decides, as PROVIDER:NAME; several split by commas"
+        default="offline",
+        description="model that decides, as PROVIDER:NAME; separate several by commas",
     )
     fleet: str = Field(
         default="simulated",
-        description="the robots of new sessions: a fleet's name, or a YAML file",
+        description="fleet of new sessions: a name, or a YAML file",
     )
-    detector: str = Field(default="standout", description="how new sessions find things")
-    segmenter: str = Field(default="grabcut", description="how new sessions make outlines")
+    detector: str = Field(default="standout", description="detector of new sessions")
+    segmenter: str = Field(default="grabcut", description="segmenter of new sessions")
     threshold: float | None = Field(
-        default=None, ge=0, le=1, description="least confidence that a mask of theirs is used at"
+        default=None,
+        ge=0,
+        le=1,
+        description="minimum confidence for a mask to be used in new sessions",
     )
     reports: Path | None = Field(
-        default=None, description="folder of reports, HTML files, that the page lists"
+        default=None, description="folder of HTML reports that the page lists"
     )
     origins: str = Field(
         default="",
-        description="other origins whose pages may call it, as https://HOST, split by commas",
+        description="other origins whose pages may call it, as https://HOST; separate several by "
+        "commas",
     )
-    hosts: str = Field(default="", description="other names of this server, split by commas")
+    hosts: str = Field(
+        default="", description="other host names of the server; separate several by commas"
+    )
     public_url: str = Field(
         default="",
-        description="address that browsers reach it by, where it is not the one it is called by",
+        description="address at which browsers reach the server, if clients call it by another one",
     )
-    upload_bytes: int = Field(default=32_000_000, ge=1_000, description="most bytes of a request")
-    pixels: int = Field(default=40_000_000, ge=100, description="most pixels of a picture")
-    sessions: int = Field(default=1_000, ge=1, description="most sessions of one token")
-    requests: int = Field(
-        default=256, ge=1, description="most requests of one token at the same time"
+    upload_bytes: int = Field(
+        default=32_000_000, ge=1_000, description="maximum size of a request in bytes"
     )
+    pixels: int = Field(default=40_000_000, ge=100, description="maximum pixels of a picture")
+    sessions: int = Field(default=1_000, ge=1, description="maximum sessions per token")
+    requests: int = Field(default=256, ge=1, description="maximum simultaneous requests per token")
     requests_per_minute: int = Field(
-        default=6_000, ge=1, description="most of one token in a minute"
+        default=6_000, ge=1, description="maximum requests per minute per token"
     )
     streams: int = Field(
-        default=1_200, ge=1, description="most event streams open at the same time"
+        default=1_200, ge=1, description="maximum event streams open at the same time"
     )
     body_seconds: float = Field(
-        default=30, gt=0, description="longest that a request may take to arrive"
+        default=30, gt=0, description="maximum seconds for a request to arrive"
     )
     shutdown_seconds: float = Field(
-        default=3, gt=0, description="longest that requests have at the end"
+        default=3, gt=0, description="maximum seconds for requests to finish at shutdown"
     )
 
     def of_session(self, **given: Any) -> Settings:

@@ -21,7 +21,7 @@ router = APIRouter(prefix="/api/sessions/{session}", tags=["sharing"], responses
     "/export", response_class=Response, responses={200: {"content": {"application/zip": {}}}}
 )
 async def export(session: str, hub: AHub, person: APerson) -> Response:
-    """What was said and what came of it: Markdown with pictures, and JSON, as one ZIP file."""
+    """Export the session as a ZIP file of Markdown with pictures, and JSON."""
     await hub.service.fresh(check_owner(session, person))
     data = await asyncio.to_thread(_zipped, hub.service.store.open(session))
     named = {"Content-Disposition": f'attachment; filename="formup-{session}.zip"'}
@@ -41,9 +41,9 @@ def _zipped(session: StoredSession) -> bytes:
 
 @router.post("/shares", status_code=201)
 async def share(session: str, hub: AHub, person: APerson) -> Shared:
-    """A code with which anybody may look at the session, and do nothing else.
+    """Create a code that gives anybody read-only access to the session.
 
-    It is sent as `Authorization: Share CODE` and holds as long as the token of who made it.
+    It is sent as `Authorization: Share CODE`, and valid as long as the token that created it.
     """
     require_scope(person, "plan")
     await hub.service.fresh(check_owner(session, person))

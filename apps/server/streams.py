@@ -49,13 +49,14 @@ async def place_of(
     await hub.service.fresh(check_owner(session, person))
     if hub.streams >= hub.settings.streams:
         raise InputError(
-            f"{hub.streams} event streams are open, as many as are allowed.", "too_many"
+            f"All {hub.streams} event streams that are allowed are open; close one, or wait.",
+            "too_many",
         )
     if last is None:
         return Place(after, 0)
     number, _, part = last.partition(".")
     if not number.isascii() or not number.isdecimal() or not (part or "0").isdecimal():
-        raise InputError(f"Last-Event-ID is {last[:20]!r}; give one that a stream of ours had.")
+        raise InputError(f"Last-Event-ID is {last[:20]!r}; give the id of an event of this server.")
     return Place(int(number) - 1, int(part or 0) + 1)
 
 
@@ -64,9 +65,11 @@ async def events(
     session: str,
     hub: AHub,
     place: Annotated[Place, Depends(place_of)],
-    watching: Annotated[bool, Query(description="simulated robots drive in real time")] = False,
+    watching: Annotated[
+        bool, Query(description="whether simulated robots drive in real time")
+    ] = False,
 ) -> AsyncIterable[ServerSentEvent]:
-    """Everything from an event on, and where the robots are while they drive."""
+    """Stream all events after a given one, and the robots' poses while they drive."""
     run = _run_before(hub.service.events(session), place.number) if place.number > 0 else 0
     hub.streams += 1
     hub.metrics.streams.inc()

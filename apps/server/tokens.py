@@ -119,13 +119,13 @@ class Tokens:
         """
         if not _NAME.fullmatch(name):
             raise InputError(
-                f"A token's name is up to 20 small letters, digits and underscores and begins with "
-                f"a letter; {name!r} is not."
+                f"{name!r} cannot name a token; give up to 20 lowercase letters, digits and "
+                "underscores, beginning with a letter."
             )
         if scope not in SCOPES:
             raise InputError(f"A token's scope is one of {', '.join(SCOPES)}, not {scope!r}.")
         if any(entry.name == name for entry in self.entries()):
-            raise InputError(f"There is a token {name!r} already; remove it, or name another.")
+            raise InputError(f"There is a token {name!r} already; remove it, or give another name.")
         token = f"fu_{secrets.token_urlsafe(32)}"
         made = datetime.now(UTC).isoformat(timespec="seconds")
         entry = Entry(name=name, scope=scope, sha256=_hash(token), created=made)
@@ -141,7 +141,7 @@ class Tokens:
         kept = tuple(entry for entry in self.entries() if entry.name != name)
         if len(kept) == len(self.entries()):
             there = ", ".join(entry.name for entry in kept) or "none"
-            raise InputError(f"There is no token {name!r}; there is {there}.")
+            raise InputError(f"There is no token {name!r}; the tokens are: {there}.")
         self._write(kept)
 
     def _write(self, entries: Sequence[Entry]) -> None:
@@ -155,7 +155,7 @@ def _parsed(path: Path) -> tuple[Entry, ...]:
     try:
         return tuple(Entry.model_validate(entry) for entry in from_json(read_text(path)))
     except (ValidationError, ValueError, TypeError):
-        raise StorageError(f"{path} is no file of tokens as formup tokens writes it.") from None
+        raise StorageError(f"{path} is not a token file written by formup tokens.") from None
 
 
 def _hash(token: str) -> str:

@@ -19,9 +19,11 @@ from .sessions import ERRORS, PICTURE, picture_sent
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["turns"], responses=ERRORS)
 AKey = Annotated[Key | None, Header(alias="Idempotency-Key")]
-Wait = Annotated[float, Query(ge=0, le=60, description="most seconds to wait for its end")]
+Wait = Annotated[
+    float, Query(ge=0, le=60, description="maximum seconds to wait for the turn to end")
+]
 RUNNING: dict[int | str, dict[str, Any]] = {
-    202: {"model": TurnState, "description": "It goes on; ask for its number again"}
+    202: {"model": TurnState, "description": "The turn is still running; get it by its number"}
 }
 
 
@@ -53,7 +55,7 @@ AnAsking = Annotated[Asking, Depends(asking)]
 
 @router.post("/messages", responses=RUNNING)
 async def say(said: Message, at: AnAsking) -> TurnState:
-    """Say something: an instruction, a change, a question, an answer, go or stop."""
+    """Send a message: an instruction, a change, a question, an answer, go or stop."""
     pointed, kept = said.pointed, said.keep_out
     turn = at.hub.service.say(at.session, said.words, at.asked, pointed=pointed, keep_out=kept)
     return await at.answer(turn)
@@ -61,13 +63,13 @@ async def say(said: Message, at: AnAsking) -> TurnState:
 
 @router.post("/edits", responses=RUNNING)
 async def edit(wanted: Edits, at: AnAsking) -> TurnState:
-    """Change the plan that stands, by edits as `edit_formation` takes them."""
+    """Change the current plan by edits in the format of the tool `edit_formation`."""
     return await at.answer(at.hub.service.edit(at.session, *wanted.edits, asked=at.asked))
 
 
 @router.post("/undo", responses=RUNNING)
 async def undo(back: Undo, at: AnAsking) -> TurnState:
-    """Go back to the plan before; robots stay where they are."""
+    """Go back to an earlier plan, or forward again; robots stay where they are."""
     return await at.answer(at.hub.service.undo(at.session, back.steps, back.to, at.asked))
 
 
@@ -75,7 +77,7 @@ async def undo(back: Undo, at: AnAsking) -> TurnState:
 async def image(
     request: Request, at: AnAsking, name: Annotated[str, Query(max_length=200)] = "picture"
 ) -> TurnState:
-    """Go on with another picture, the body; plans made before are void."""
+    """Continue with the picture in the request body; earlier plans become void."""
     picture = await picture_sent(request, at.hub, name)
     return await at.answer(at.hub.service.image(at.session, picture, at.asked))
 
@@ -89,7 +91,7 @@ async def deploy(
     response: Response,
     key: Annotated[Key, Header(alias="Idempotency-Key")],
 ) -> TurnState:
-    """Drive the robots to a plan: a job, done once for a key. Real ones wait for an approval."""
+    """Drive the robots to a plan, once per idempotency key; real robots wait for an approval."""
     require_scope(person, "move")
     asked, name = asked_by(person, key), check_owner(session, person)
     run = (await hub.service.fresh(name)).run
@@ -106,7 +108,7 @@ async def deploy(
 async def approve(
     session: str, given: Approval, hub: AHub, person: APerson, response: Response
 ) -> TurnState:
-    """Say yes to exactly the plan that waits; real robots then drive to it."""
+    """Approve exactly the plan that waits; real robots then drive to it."""
     require_scope(person, "move")
     asked = asked_by(person)
     name = await check_seen(hub, session, person)
@@ -118,7 +120,7 @@ async def approve(
 
 @router.post("/stop")
 async def stop(session: str, hub: AHub, person: APerson) -> TurnState:
-    """Hold all robots at once, and end the turn that runs."""
+    """Hold all robots at once, and end the running turn."""
     now = hub.service.turn(session)
     mine = check_owner(session, person, now and now.asked.by)
     run = await hub.service.stop(mine, asked_by(person))
@@ -131,7 +133,7 @@ async def stop(session: str, hub: AHub, person: APerson) -> TurnState:
 async def turn(
     session: str, number: int, hub: AHub, person: APerson, response: Response, wait: Wait = 0
 ) -> TurnState:
-    """A turn by the number of the event that began it."""
+    """Get a turn by the number of the event that began it."""
     if not person.may("approve"):
         check_owner(session, person)
     now = hub.service.turn(session)
@@ -200,5 +202,5 @@ def state_in(events: Sequence[Event], number: int) -> TurnState:
         if event.kind == "end":
             told = {"status": event.data["status"], "message": event.data["message"]}
             return state.model_copy(update=told)
-    message = "Its process ended before it did; robots were held. Say what to do next."
+    message = "The server's process ended during this turn; robots were held. Say what to do next."
     return state.model_copy(update={"message": message, "moving": moving})

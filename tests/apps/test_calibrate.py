@@ -152,7 +152,7 @@ ON_A_LINE = points(ASKEW, [(0.5, 1.5), (1.5, 1.5), (2.5, 1.5), (3.5, 1.5)])
         (SWAPPED, "beyond the horizon"),
         ([*points(ASKEW), "--point", "1400,20=1,1"], "Point 1400,20 is outside the picture"),
         ([*points(ASKEW), "--point", "1,2"], "--point '1,2' cannot be read"),
-        ([], "--known FILE, or four or more --point"),
+        ([], "either --known FILE or at least four --point"),
     ],
 )
 def test_points_that_cannot_be(cli: Cli, tmp_path: Path, arguments: list[str], words: str) -> None:
@@ -241,7 +241,7 @@ def test_a_camera_takes_the_picture(cli: Cli, calibrated: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("lab.png", "Go", "--camera", "0"), "--camera takes the picture; leave out 'lab.png'"),
+        (("lab.png", "Go", "--camera", "0"), "Both 'lab.png' and --camera give a picture"),
         (("lab.png",), "give IMAGE and INSTRUCTION"),
         (("Go", "--camera", "none.avi"), "Camera none.avi cannot be opened"),
         (("small.png", "Go", "--calibration", "camera.yaml"), "but camera.yaml is for 1280 x 720"),

@@ -160,7 +160,7 @@ def test_lines_for_a_person_have_no_escapes(chat: Chat) -> None:
         (b"/undo x", ["scene.png"], "/undo 'x'"),
         (b"/go", ["scene.png"], "Say what to do first"),
         (b"/point here", ["scene.png"], "/point 'here'"),
-        (b"hello", [], "Name a picture"),
+        (b"hello", [], "Give a picture to talk about"),
         (b"hello", ["--session", "nothere"], "'nothere'"),
         (b"hello", ["missing.png"], "missing.png"),
         (b"hello", ["scene.png", "--auto", "--plan-only"], "--auto"),

@@ -353,7 +353,7 @@ def test_a_reply_that_broke_off_is_told_anew(start: Start) -> None:
         chat = start("--plain", "--model", "openai:any", "--base-url", address)
         chat.wait("you:")
         chat.type("Hi\r")
-        chat.wait("formup: Hello \nnote: The reply broke off; it begins anew.\n")
+        chat.wait("formup: Hello \nnote: The reply broke off and starts again.\n")
         chat.wait("formup: Good morning.\n")
         chat.wait("you:")
         chat.type("\x04")

@@ -230,7 +230,7 @@ def test_eval_says_what_is_wrong(cli: Cli, tmp_path: Path) -> None:
     refused(cli("eval", "run", "scenes", "--seeds", "9-3"), "'9-3'", "0-199")
     refused(cli("eval", "run", "smoke", "--seeds", "0-3"), "not made of one range of seeds")
     replay = ("--method", "agent", "--model", f"replay:{tmp_path}")
-    refused(cli("eval", "run", "photos", *replay), "none has a recording here")
+    refused(cli("eval", "run", "photos", *replay), "No task is left to run")
     (tmp_path / "annotations.json").write_text("[{}]")
     refused(cli("eval", "run", tmp_path), "required")
 

@@ -128,7 +128,7 @@ def test_what_cannot_be_met_is_impossible_and_nothing_else_is_tried(
     [
         (None, (), "No such file"),
         ("{", (), "Invalid JSON"),
-        ("[1]", (), "is no contract"),
+        ("[1]", (), "is not a valid contract"),
         ('{"groups": []}', (), "groups"),
         ('{"groups": [{"relation": "ring", "robots": 0}]}', (), "robots"),
         ('{"groups": [{"relation": "around", "targets": ["t1"], "robots": 3}], "x": 1}', (), "x"),

@@ -111,7 +111,7 @@ def test_a_plan_is_followed_with_for_so_long(
     assert "They followed t1 for 1.0 s" in report["message"]
     assert formup(*drive, "--follow", 1, "--follow-speed", 1) == 4
     assert "no more than 1 px/s were allowed" in capsys.readouterr().out
-    with pytest.raises(InputError, match="--follow-speed says how fast"):
+    with pytest.raises(InputError, match="--follow-speed needs --follow SECONDS"):
         formup(*drive, "--follow-speed", 5)
 
 

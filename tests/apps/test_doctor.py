@@ -56,12 +56,12 @@ def test_it_says_what_is_there_and_makes_nothing(home: Path) -> None:
     assert not [text for text in found["library"].values() if "broken" in text]
     assert set(found["extra"]) == set(metadata("formup").get_all("Provides-Extra") or ())
     assert set(PURPOSES) <= set(found["extra"])
-    assert found["extra"]["postgres"] == "installed; for a store"
+    assert found["extra"]["postgres"] == "installed; for sessions in PostgreSQL"
     assert found["variable"] == dict.fromkeys(VARIABLES, "not set")
     assert set(found["machine"]) == {"display", "browser", "camera"}
     assert found["storage"] == {
-        "data folder": f"{home / 'data/formup'} can be written",
-        "sessions": f"{home / 'data/formup/sessions.db'} can be written; no sessions",
+        "data folder": f"{home / 'data/formup'} is writable",
+        "sessions": f"{home / 'data/formup/sessions.db'} is writable; no sessions",
     }
     for kind, name in (("fleet", "simulated"), ("detector", "standout"), ("segmenter", "grabcut")):
         assert found[kind][name] == "built in"
@@ -111,7 +111,7 @@ def test_sessions_are_counted(address: str, home: Path, monkeypatch: pytest.Monk
     store.close()
     where = address.removeprefix("sqlite:///")
     counted = told(home, FORMUP_STORE=address)["storage"]["sessions"]
-    assert counted == f"{where} can be written; 2 sessions"
+    assert counted == f"{where} is writable; 2 sessions"
 
 
 def test_plugins_that_are_broken_are_named_and_print_nothing_on_stdout(home: Path) -> None:
@@ -127,7 +127,7 @@ def test_plugins_that_are_broken_are_named_and_print_nothing_on_stdout(home: Pat
         leaving="raise SystemExit('bye')",
     )
     fleets = told(home)["fleet"]
-    assert fleets.pop("wheels") == "of an installed package"
+    assert fleets.pop("wheels") == "from an installed package"
     ours = ("simulated", "mqtt", "recorded", "ros", "vda5050")
     assert {fleets.pop(name) for name in ours} == {"built in"}
     assert fleets == {
@@ -147,5 +147,5 @@ def test_a_library_that_is_broken_is_named_by_itself_alone(library: str, home: P
     assert set(found) >= {"program", "library", "extra", "machine"}
     other = doctor(home, "sessions", "list")
     assert (other.returncode, other.stdout) == (2, "")
-    assert "libc.so.9: cannot open shared object file; formup doctor says" in other.stderr
+    assert "libc.so.9: cannot open shared object file; formup doctor shows" in other.stderr
     assert "Traceback" not in other.stderr

@@ -93,8 +93,8 @@ def test_compare_says_what_would_settle_it(runs: Path, capsys: pytest.CaptureFix
     assert formup("eval", "compare", runs / "old", uneven) == 0
     text = capsys.readouterr().out
     assert "\ndifference: inconclusive\ngate: inconclusive: success may fall" in text
-    assert "\nto settle the difference, telling 5.0 points (power .8): " in text
-    assert "\nto settle the gate, telling " in text
+    assert "\nto settle the difference, detecting 5.0 points (power .8): " in text
+    assert "\nto settle the gate, detecting " in text
     assert " tasks with 10 trials of each\n" in text
 
 
@@ -130,7 +130,7 @@ def test_arms_of_one_run_are_chosen_by_words(
     assert [printed[side]["prompt"] for side in "ab"] == ["former@v001", "former@v002"]
     assert printed["outcome"] == "better"
     for wrong in ((), ("--arm-a", "offline"), ("--arm-a", "former@v009")):
-        with pytest.raises(InputError, match=r"holds 2 arms\. .*--arm-a.*former@v001#0"):
+        with pytest.raises(InputError, match=r"holds 2 arms; .*--arm-a.*former@v001#0"):
             formup("eval", "compare", both, both, *wrong)
 
 

@@ -193,7 +193,7 @@ def test_a_draft_that_was_blocked_is_released_with_a_word_about_it(
     report = comparison(tmp_path / "comparison.json", *names, verdict="block")
     code, out, err = cli("prompts", "release", "former@draft-x", *WHY, "--report", report)
     assert (code, out) == (0, "former@v003\n")
-    assert "former@v003 is released, but not passed: block on dev against former@v002." in err
+    assert "former@v003 is released, but has not passed: block on dev against former@v002." in err
     assert "(block on dev against former@v002)" in done(cli("prompts", "log", "former"))
     refused(cli("prompts", "promote", "former@v003", "--report", report), "verdict is 'block'")
 
@@ -329,7 +329,7 @@ def test_a_run_is_told_a_draft_and_says_so(
     assert "former@draft-x" in done(cli("trace", "out"))
     edit(draft, "6 to 9 vertices", "5 to 9 vertices")
     monkeypatch.setenv("FORMUP_PROMPTS", "")  # the trace knows where the draft lies
-    refused(cli("resume", "out", "--answer", "the red one"), "is not what this run was begun with")
+    refused(cli("resume", "out", "--answer", "the red one"), "has changed since this run began")
     edit(draft, "5 to 9 vertices", "6 to 9 vertices")
     assert cli("resume", "out", "--answer", "the red one")[0] == 0
     assert told == [made.text] * 2

@@ -271,6 +271,8 @@ def test_leave_to_move_is_asked_for_at_a_terminal(
 ) -> None:
     coins = SMARTIES.with_name("us_coins.jpg")
     words = (coins, "Cage the largest coin", "-n", "6", "--policy", "deploy=ask")
-    ended, shown = at_terminal(*words, cwd=tmp_path, answers=[said], prompt="yes, or no and why")
+    ended, shown = at_terminal(
+        *words, cwd=tmp_path, answers=[said], prompt="yes, or no and the reason"
+    )
     assert word in " ".join(shown.split())
     assert ended == code

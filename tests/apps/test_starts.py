@@ -43,10 +43,10 @@ def test_tables_and_json(tmp_path: Path, text: str, encoding: str) -> None:
         ("1.234,5;60\n", "line 1: '1.234,5;60'"),
         ("20,60\nx,y\n", "line 2: 'x,y'"),
         ("20\n", "line 1: '20'"),
-        ("x,y\n", "holds no positions"),
-        ("20,inf\n", "holds no positions"),
+        ("x,y\n", "holds no usable positions"),
+        ("20,inf\n", "holds no usable positions"),
         ('{"starts": [[20, 60]]}', "line 1"),
-        ('[{"x": 20, "y": 60}]', "holds no positions"),
+        ('[{"x": 20, "y": 60}]', "holds no usable positions"),
     ],
 )
 def test_what_cannot_be_read_is_named_by_its_line(tmp_path: Path, text: str, said: str) -> None:
@@ -54,4 +54,4 @@ def test_what_cannot_be_read_is_named_by_its_line(tmp_path: Path, text: str, sai
     with pytest.raises(InputError) as caught:
         starts(tmp_path / "starts.csv")
     assert said in str(caught.value)
-    assert "x,y a line" in str(caught.value)
+    assert "one x,y per line" in str(caught.value)

@@ -223,7 +223,7 @@ def test_a_chat_is_watched_turn_after_turn(tmp_path: Path) -> None:
 def test_without_a_display_it_says_so_and_leaves_the_film(tmp_path: Path) -> None:
     done = formup(*told(tmp_path, "--watch", "--film", tmp_path / "film.png"))
     assert done.returncode == 0, done.stderr
-    why = "formup: this machine has no display: watch the film among the files instead.\n"
+    why = "formup: this machine has no display; watch the film in the output folder instead.\n"
     assert why in done.stderr
     assert (tmp_path / "out/deploy.gif").exists()
     with Image.open(tmp_path / "film.png") as strip:
@@ -245,6 +245,6 @@ def test_without_its_library_it_says_what_to_install(tmp_path: Path) -> None:
 def test_a_film_that_cannot_be_is_refused_before_the_run(tmp_path: Path, name: str) -> None:
     done = formup(*told(tmp_path, "--film", tmp_path / name))
     assert done.returncode == 2
-    form = "name a file ending in .gif, .mp4, .png in a folder that is there."
+    form = "name a file ending in .gif, .mp4, .png in an existing folder."
     assert done.stderr == f"formup: --film {tmp_path / name} cannot be written; {form}\n"
     assert not (tmp_path / "out").exists()

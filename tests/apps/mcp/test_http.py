@@ -116,9 +116,9 @@ def test_a_picture_is_uploaded_and_named(place: Places, era: str) -> None:
             )
             assert again["robots"] == 6
             path = await refusal(client, "open_scene", image=str(PHOTOS / "us_coins.jpg"))
-            assert "cannot be named" in path
+            assert "cannot be opened" in path
         async with there.client("bob", era) as client:
-            assert "cannot be named" in await refusal(client, "open_scene", image=made)
+            assert "cannot be opened" in await refusal(client, "open_scene", image=made)
 
     place(talk)
 

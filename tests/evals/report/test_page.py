@@ -165,8 +165,8 @@ def test_what_is_missing_is_said(runs: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--arm-b", "agent"], "goes with --against"),
-        (["--arm-a", "nobody"], "fits 0 of these"),
+        (["--arm-b", "agent"], "needs --against"),
+        (["--arm-a", "nobody"], "fits 0 of them"),
     ],
 )
 def test_what_cannot_be_shown_is_said(runs: Path, arguments: list[str], said: str) -> None:

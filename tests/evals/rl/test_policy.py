@@ -139,11 +139,11 @@ def test_training_without_its_extra_and_with_what_it_does_not_take(
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "formup.evals.rl.train", None)
     train = ["eval", "train-rl", "--out", str(tmp_path / "none")]
-    with pytest.raises(InputError, match=r"needs the extra: pip install 'formup\[rl\]'"):
+    with pytest.raises(InputError, match=r"needs an extra: pip install 'formup\[rl\]'"):
         formup(*train)
     assert not (tmp_path / "none").exists()
     with pytest.raises(InputError, match=r"Unknown category 'herd'. There are: general"):
         formup(*train, "--category", "herd")
     policies = write_policies(tmp_path / "policies")
-    with pytest.raises(InputError, match="is of teams of 6, not 8; use another folder"):
+    with pytest.raises(InputError, match="policies for teams of 6, not 8; use another folder"):
         formup("eval", "train-rl", "--out", policies)

@@ -163,7 +163,7 @@ def test_a_session_that_was_deleted_is_told(serve: Serve, chat: Any, store: Stor
     talk = chat(serve())
     session = session_of(talk.say(CAGE, "us_coins.jpg"))
     store.delete(session)
-    with pytest.raises(NotFoundError, match="not there any more; begin a new chat"):
+    with pytest.raises(NotFoundError, match="no longer exists; begin a new chat"):
         talk.say("a bit further out")
 
 
@@ -190,7 +190,7 @@ def test_a_turn_goes_on_when_its_client_has_gone(
     assert asked.wait(10)
     stream.close()
     impatient = chat(url, messages=talk.messages)
-    assert "I am still at what you said before" in impatient.say("and now?")
+    assert "I am still working on your last message" in impatient.say("and now?")
     answered.set()
     assert "Nothing to do." in chat(url, messages=talk.messages).again()
     assert [*turns(store).values()] == [[CAGE]]

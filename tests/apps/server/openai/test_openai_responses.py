@@ -115,5 +115,5 @@ def test_what_is_not_there_is_told(serve: Serve, client: Any, caged: list[Any]) 
         with pytest.raises(NotFoundError):
             openai.responses.retrieve(id)
     file = [{"role": "user", "content": [{"type": "input_image", "file_id": "f-1"}]}]
-    with pytest.raises(UnprocessableEntityError, match="nothing is fetched"):
+    with pytest.raises(UnprocessableEntityError, match="this server fetches nothing"):
         openai.responses.create(model="formup", input=file, previous_response_id=follows.id)
