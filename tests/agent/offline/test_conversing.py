@@ -264,3 +264,10 @@ def test_a_question_about_a_thing_gives_way_to_a_command_or_a_question(picture: 
     assert str(told.report.message).startswith("Each is ")
     more = Agent().resume(still, answer="two more robots")
     assert len(more.report.positions or ()) == 10
+
+
+def test_before_any_plan_help_says_how_to_begin(picture: Picture) -> None:
+    for words in ("hello", "help"):
+        said = Agent().run(picture, words, settings=PLAN).report.message
+        assert "surround the coin with 6 robots" in said
+        assert "further out" not in said

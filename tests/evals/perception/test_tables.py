@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from formup.apps import eval_perception
 from formup.apps.cli import app
 from formup.evals.perception.fit import CUES, fit_weights, held_out_likelihoods
 from formup.evals.perception.samples import TRIALS, Sample, measured
@@ -11,6 +12,7 @@ from formup.evals.perception.tables import markdown, reliability, row
 from formup.tools.errors import InputError
 from formup.tools.perception.segmenters.confidence import fitted_weights
 from formup.tools.perception.segmenters.grabcut_segmenter import GrabCutSegmenter
+from formup.tools.perception.segmenters.protocol import Segmenter
 from shapely.geometry import box
 
 SQUARE = box(0, 0, 100, 100)
@@ -81,3 +83,16 @@ def test_an_unknown_mode_is_named() -> None:
         InputError, match=r"Unknown mode 'words'\. There are: outline, box, point\."
     ):
         app(["eval", "perception", "smoke", "--mode", "words"], standalone_mode=False)
+
+
+class BoxesOnly(GrabCutSegmenter):
+    takes = frozenset({"box"})
+
+
+def test_a_mode_that_a_segmenter_does_not_take_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    def named(name: str) -> Segmenter:
+        return BoxesOnly()
+
+    monkeypatch.setattr(eval_perception, "segmenter_named", named)
+    with pytest.raises(InputError, match="takes only box"):
+        app(["eval", "perception", "photos", "--mode", "point"], standalone_mode=False)

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formup.tools.errors import InputError
-from formup.tools.fleet.described import fleet_named
+from formup.tools.fleet.described import described_as, fleet_named
 from formup.tools.fleet.protocol import FleetRequest
 from formup.tools.fleet.simulated import SimulatedFleet
+from formup.tools.fleet.wire.settings import WireSettings
 
 EXAMPLE = Path(__file__).parents[3] / "examples/hamsters.yaml"
 REQUEST = FleetRequest((640.0, 480.0), 4)
@@ -95,6 +96,8 @@ def test_a_mistake_is_found_before_a_fleet_is_opened(tmp_path: Path, text: str, 
 def test_a_file_that_is_not_there_and_faults_of_nobody_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.yaml cannot be read: No such file"):
         fleet_named(str(tmp_path / "none.yaml"))
+    with pytest.raises(InputError, match="mqtt is no file; give the YAML file of a fleet"):
+        described_as(WireSettings, Path("mqtt"))
     nobody = written(tmp_path, "fleet: simulated\nlost: [{robot: 9}, {robot: 2}]")
     with pytest.raises(InputError, match="faults of robot 9; the fleet has 4 robots, 1 to 4"):
         opened(nobody)
