@@ -109,7 +109,8 @@ def _storage() -> Looks:
                 store.rename("none", "")  # a database checks who may write first
             except StorageError as error:
                 can = can if error.kind == "missing" else str(error).rstrip(".")
-            return f"{can}; {len(store.sessions())} sessions"
+            number = len(store.sessions())
+            return f"{can}; {number} session{'s' * (number != 1)}"
 
     yield "storage", "data folder", lambda: _writable(data_folder())
     yield "storage", "sessions", look

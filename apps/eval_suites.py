@@ -44,7 +44,8 @@ def add(folder: e.NewFolder, name: e.Name = None) -> None:
     except InputError:
         path.unlink()
         raise
-    say(f"{path}: {len(made.tasks)} tasks. Run it: formup eval run {folder}")
+    number = len(made.tasks)
+    say(f"{path}: {number} task{'s' * (number != 1)}. Run it: formup eval run {folder}")
 
 
 def descriptors(suite: e.DescribedSuite = "photos") -> None:

@@ -17,6 +17,8 @@ MODELS = os.getenv("MODELS", "simulated").split()  # such as "openai:NAME anthro
 TRIALS, BUDGET = os.getenv("TRIALS", "3"), os.getenv("BUDGET", "1")  # tries of a task, USD
 ID, MINE, RUN = "brisk", Path("mine"), Path("formup-runs/half-hour")
 os.environ["FORMUP_PROMPTS"] = str(MINE)
+if not DRAFT.is_file():
+    sys.exit(f"Write the text to try into {DRAFT} first, or name another file with DRAFT=FILE.")
 
 
 def formup(*words: object, codes: tuple[int, ...] = (0,)) -> str:
