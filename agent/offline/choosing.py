@@ -8,7 +8,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain, count, repeat
+from itertools import count
 from textwrap import shorten
 from typing import Any
 
@@ -54,6 +54,8 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
     asked = [c for c in calls_in(history) if c.name == "ask_user" and c.arguments.get("candidates")]
     if isinstance(found, list) or found.name != "ask_user" or not asked:
         return found
+    if len(chosen_candidates(history, needed)) == len(asked):
+        return found  # each answer chose one, and this is about the next
     answer = next((m.text for m in history if _answers(m, asked[-1])), "")
     quoted = shorten(answer, MOST_QUOTED, placeholder=" ...")
     question = f'"{quoted}" chooses none of them. {found.arguments["question"]}'
@@ -61,27 +63,27 @@ def find(things: Sequence[Reference], needed: int, history: History) -> list[Fou
 
 
 def _find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
-    meant = [thing.wording for thing in things] if len(things) <= needed else []
-    labels = chain(meant, repeat("the chosen thing"))
-    chosen = [
-        Found(name, label, ())
-        for name, label in zip(chosen_candidates(history, needed), labels, strict=False)
-    ]
+    chosen = chosen_candidates(history, needed)
     if len(chosen) >= needed:
-        return chosen[:needed]
+        label = things[0].wording if needed == len(things) == 1 else "the chosen thing"
+        return [Found(name, label, ()) for name in chosen]
     if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
         return _pair(things[0], history)
     if len(things) > needed:
         named = " or ".join(f'"{t.wording}"' for t in things)
         return _ask_all(f"Which thing is the arrangement about: {named}?", history)
     found: list[Found] = []
-    for thing in things[: needed - len(chosen)] if not chosen else ():
+    for thing in things:
         one = _choose_one(thing, history)
+        if isinstance(one, Step) and one.name == "ask_user" and chosen:
+            one = Found(chosen.pop(0), thing.wording, ())  # the answer to that question
         if isinstance(one, Step):
             return one
         found.append(one)
     if len(found) == needed:
         return found
+    if one := [*(f.candidate for f in found), *chosen]:
+        return _ask_all(f"Which is the other thing, beside {one[0]}?", history)
     which = "Which thing is meant?" if needed == 1 else "Which two things are meant?"
     spoken = " or ".join(f'"{t.wording}"' for t in things)
     named = f"By {spoken} none can be found" if spoken else "The words name none that can be found"

@@ -227,6 +227,10 @@ def _agreed(task: Task, history: History) -> Reply | None:
 
 def _things(task: Task, reading: Reading) -> tuple[Reference, ...]:
     """Return what the phrases for things refer to; if none do, what the whole instruction does."""
+    if len(reading.things) == things_needed(reading) > 1:  # the second repeats nothing
+        each = [thing for phrase in reading.things for thing in described([phrase])]
+        if len(each) == len(reading.things):
+            return tuple(each)
     return described(reading.things) or described([task.instruction])
 
 

@@ -14,6 +14,7 @@ from formup.agent.messages import Call, Reply, Result, User
 from formup.agent.wrappers.doubles import ScriptedModel
 from formup.apps.arguments import pointed
 from formup.apps.run_files import Folder, write_files
+from formup.tools.context import Settings
 from formup.tools.draw import draw_look
 from formup.tools.errors import InputError
 from formup.tools.perception.image import load_picture
@@ -21,6 +22,8 @@ from formup.tools.world import World
 from PIL import Image, ImageChops
 
 SMARTIES = Path(__file__).parents[2] / "evals/photos/images/smarties.png"
+TABLE = SMARTIES.with_name("table_stuff.jpg")
+PLAN = Settings(may_deploy=False)
 BLUE = (SMARTIES, "Ring the blue ball", "-n", "4")
 PROMPT = "your answer"
 person = pytest.mark.skipif(sys.platform == "win32", reason="POSIX terminals")
@@ -230,6 +233,25 @@ def test_an_answer_in_python_goes_on_where_it_paused() -> None:
     assert done.report.usage.seconds >= paused.report.usage.seconds > 0
     with pytest.raises(InputError, match="asked nothing"):
         agent.resume(done, answer="2")
+
+
+@pytest.mark.parametrize(
+    ("words", "answers", "left"),
+    [
+        ("the white disc and the coin", "5", [("white disc", 33), ("coin", 18)]),
+        ("the coin and the lid", "52", [("chosen thing", 18), ("chosen thing", 19)]),
+    ],
+)
+def test_of_two_things_an_answer_settles_the_one_asked_about(
+    words: str, answers: str, left: list[tuple[str, int]]
+) -> None:
+    run = Agent().run(load_picture(TABLE), f"Line up 5 robots between {words}", settings=PLAN)
+    for answer in answers:
+        assert run.report.status == "question"
+        assert "chooses none" not in run.report.message
+        run = Agent().resume(run, answer=answer)
+    assert run.report.status == "planned"
+    assert [(t["label"], int(t["box"][0] / 10)) for t in run.report.targets] == left
 
 
 @pytest.mark.parametrize(
