@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formup.apps.demo import RUNS
 from PIL import Image
 
 ROOT = Path(__file__).parent.parent
@@ -189,7 +190,7 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_make_demo_points_at_the_things_it_names() -> None:
-    makefile = (ROOT / "Makefile").read_text("utf-8")
-    for name in ("cars_two.jpg", "ucm_sparseresidential28.jpg", "us_coins.jpg"):
-        assert name in makefile
-        assert (ROOT / "evals/photos/images" / name).is_file()
+    assert "formup demo" in (ROOT / "Makefile").read_text("utf-8")
+    pictures = {picture.name: picture for picture, _ in RUNS.values()}
+    assert {"cars_two.jpg", "ucm_sparseresidential28.jpg", "us_coins.jpg"} < set(pictures)
+    assert all(picture.is_file() for picture in pictures.values())

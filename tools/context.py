@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 from .errors import InputError, StorageError, ToolError
-from .fleet.described import fleet_named
+from .fleet.described import fleet_named, stated_radius
 from .fleet.follow import Rigid
 from .fleet.protocol import Fleet, Pose
 from .formation.plan import Plan
@@ -265,15 +265,21 @@ class Context:
     def check(self) -> "Context":
         """Check the person's settings and return the context with their scale in the world.
 
+        Robots are as large as the fleet's file says, unless the person said otherwise.
+
         Raises:
             InputError: an unknown segmenter, detector or fleet, or an impossible scale.
         """
         check_settings(self.settings)
+        sized = self
+        if self.settings.robot_radius is None:
+            stated = {"robot_radius": stated_radius(self.settings.fleet)}
+            sized = replace(self, settings=self.settings.model_copy(update=stated))
         scale = self.settings.metres_per_pixel
         if scale is None or scale == self.world.metres_per_pixel:
-            return self
+            return sized
         check_scale(scale)
-        return replace(self, world=self.world.having(metres_per_pixel=scale))
+        return replace(sized, world=self.world.having(metres_per_pixel=scale))
 
     def at(self, world: World) -> "Context":
         """Return the same context with another world."""

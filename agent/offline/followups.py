@@ -18,6 +18,7 @@ from .drawn_forms import form_in
 from .escorting import without_follow
 from .followup import Followup, Kind
 from .followup_edits import Effect, listed
+from .followup_go import with_sure_go
 from .followup_last import RELATIVE, corrected
 from .followup_places import meant_by_place, numbered
 from .followup_recent import all_or_those, with_numbers
@@ -100,14 +101,14 @@ def _read_numbered(words: str, standing: Standing | None) -> Followup:
     """Return what is meant by words in which robots have their numbers."""
     if standing is not None:
         words, _ = without_follow(words, standing.stood_about, standing.metres_per_pixel)
-    meant = _read(words, standing)
+    meant = with_sure_go(words, _read(words, standing))
     if standing is None or not (meant.kind == "ask" or meant.things):
         return meant
     kept, told = without_asides(words, standing)
     told = told if meant.kind == "ask" else tuple(part for part in told if TELLS_OF.match(part))
     if not told or not kept.strip(" ,.;:!?"):
         return meant
-    plain = _read(kept, standing)
+    plain = with_sure_go(words, _read(kept, standing))
     clear = plain.kind not in ("ask", "instruction", "talk")
     return replace(plain, background=(*plain.background, *told)) if clear else meant
 

@@ -74,6 +74,23 @@ def fleet_named(name: str) -> FleetFactory:
     return lambda request: load(replace(request, config=path))
 
 
+def stated_radius(name: str) -> float | None:
+    """The radius of a robot that a fleet's file states, px of the picture; None where none does.
+
+    Raises:
+        InputError: the file does not describe a fleet.
+    """
+    path = Path(name)
+    if path.suffix.lower() not in SUFFIXES:
+        return None
+    content = content_of(path, BEGIN)
+    if content.get("fleet") in KINDS:
+        settings = described_as(KINDS[content["fleet"]], path)
+        return settings.pixels(settings.radius) if isinstance(settings, WireSettings) else None
+    radius = content.get("radius")
+    return float(radius) if isinstance(radius, int | float) else None
+
+
 def described(path: Path) -> Described:
     """The simulated fleet of a file.
 
