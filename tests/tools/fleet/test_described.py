@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from formup.tools.errors import InputError
-from formup.tools.fleet.described import described_as, fleet_named
+from formup.tools.fleet.described import described_as, fleet_named, stated_radius
 from formup.tools.fleet.protocol import FleetRequest
 from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.fleet.wire.settings import WireSettings
 
 EXAMPLE = Path(__file__).parents[3] / "examples/hamsters.yaml"
 REQUEST = FleetRequest((640.0, 480.0), 4)
+
+ROOT = Path(__file__).parents[3]
 
 
 def opened(path: Path, request: FleetRequest = REQUEST) -> SimulatedFleet:
@@ -101,3 +103,13 @@ def test_a_file_that_is_not_there_and_faults_of_nobody_are_refused(tmp_path: Pat
     nobody = written(tmp_path, "fleet: simulated\nlost: [{robot: 9}, {robot: 2}]")
     with pytest.raises(InputError, match="faults of robot 9; the fleet has 4 robots, 1 to 4"):
         opened(nobody)
+
+
+def test_robots_are_as_large_as_the_file_says(tmp_path: Path) -> None:
+    text = (ROOT / "examples/warehouse.yaml").read_text("utf-8")
+    settings = described_as(WireSettings, ROOT / "examples/warehouse.yaml")
+    metres = settings.frame.metres_per_pixel
+    assert stated_radius(str(written(tmp_path, text))) == pytest.approx(settings.radius / metres)
+    assert stated_radius(str(written(tmp_path, "fleet: simulated\nradius: 5"))) == 5.0
+    assert stated_radius(str(written(tmp_path, "fleet: simulated"))) is None
+    assert stated_radius("simulated") is None
