@@ -21,6 +21,7 @@ from .first_message import standing
 from .model import Model
 from .offline.followups import read_followup
 from .offline.standing import Standing
+from .open_question import check_settled
 from .outcomes import Paused
 from .session import Run, SayOptions, Show
 from .store.protocol import StoredSession
@@ -128,8 +129,9 @@ class Session:
             if run.world.current == run.began.current:
                 return await self.aact(words, text=UNCHANGED, show=show)
         if run is not None and isinstance(run.outcome, Paused):
-            shown = (*pointed, *keep)
-            if not shown and read_followup(words, self._standing(run)).kind not in DROPS:
+            shown, kind = (*pointed, *keep), read_followup(words, self._standing(run)).kind
+            check_settled(run.outcome, kind)
+            if not shown and kind not in DROPS:
                 return self._keep(await self._answered(run, words, show))
             if shown:  # the answer is something pointed at
                 words = f"{run.report.instruction} {words}".strip()

@@ -38,6 +38,7 @@ Kind = Literal[
     "repeated",
     "approval",
     "not_allowed",
+    "asked",
     "too_large",
     "too_many",
 ]
@@ -53,7 +54,8 @@ places stand in each other's way; nothing_to_undo: there is no step back, or non
 missing, busy, gone_on: a session that is not in its store, is written by another process, or was
 written since it was opened; key, repeated: a turn was asked for under a key before, with other
 arguments or the same (`turn`, its number); approval: a yes to something that does not wait for
-one; not_allowed: whoever asks may not do that; too_large, too_many: more than a server takes."""
+one; not_allowed: whoever asks may not do that; asked: a question is open; too_large, too_many:
+more than a server takes."""
 
 
 class FormupError(Exception):

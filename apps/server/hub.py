@@ -25,6 +25,7 @@ STATUS: Mapping[Kind | None, int] = {
     "key": 409,
     "repeated": 409,
     "approval": 409,
+    "asked": 409,
     "not_allowed": 403,
     "too_large": 413,
     "too_many": 429,

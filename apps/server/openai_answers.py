@@ -190,7 +190,7 @@ async def _fallback_answer(
     if error.kind == "repeated":
         place = Place(session, error.facts["turn"])
         return await answer_of(place, await run_at(hub, place), base)
-    if error.kind == "not_allowed":
+    if error.kind in ("not_allowed", "asked"):
         return _text_answer(str(error), base, request.place)
     if error.kind != "busy":
         raise error
