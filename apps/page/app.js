@@ -43,14 +43,17 @@ export const refresh = async () => {
   const changed = app.scene?.picture.sha256 !== scene.picture.sha256;
   Object.assign(app, { state, scene });
   if (changed) await loadPicture();
+  if (app.scene !== scene) return; // another session was opened meanwhile
   tell("scene");
 };
 
 const loadPicture = async () => {
+  const session = app.session, scene = app.scene;
+  const file = await fetched(at("/picture"));
+  if (app.scene !== scene) return;
   if (app.picture) URL.revokeObjectURL(app.picture);
-  app.picture = URL.createObjectURL(await fetched(at("/picture")));
+  app.picture = URL.createObjectURL(file);
   app.things = [];
-  const session = app.session;
   if (!app.reading) call("GET", at("/things")).then((things) => {
     if (session === app.session) app.things = things;
     tell("things");
