@@ -11,7 +11,7 @@ from typing import Any
 from ..agent.agent import Agent
 from ..agent.conversation import is_stop
 from ..agent.outcomes import Answered
-from ..agent.report import Report, Totals
+from ..agent.report import Report, Status, Totals
 from ..agent.service import Service
 from ..agent.session import Run, Show
 from ..tools.context import Context, View, unseen
@@ -112,10 +112,10 @@ class Talk:
         """Return whether a line typed while a turn runs says to stop."""
         return is_stop(text, driving=True)
 
-    def failed(self, text: str, message: str) -> Shown:
-        """Return the result of a line that could not be carried out, with that message."""
+    def refused(self, text: str, message: str, status: Status) -> Shown:
+        """Return the result of a line that was not carried out, with that message."""
         self._turn += 1
-        report = self._unchanged_report(text, message).model_copy(update={"status": "failed"})
+        report = self._unchanged_report(text, message).model_copy(update={"status": status})
         return Shown(self._turn, replace(self.run, report=report))
 
     def words(self) -> list[str]:

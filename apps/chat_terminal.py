@@ -69,8 +69,9 @@ async def run_script(talk: Talk, lines: Iterable[str], display: Display | None) 
         try:
             shown, hits = await _interruptible(talk, text, display)
         except (FormupError, PromptError) as error:
-            code = 4 if isinstance(error, ModelError | FleetError) else 2
-            shown, hits = talk.failed(text, str(error)), 0
+            asked = isinstance(error, FormupError) and error.kind == "asked"
+            code = 0 if asked else 4 if isinstance(error, ModelError | FleetError) else 2
+            shown, hits = talk.refused(text, str(error), "question" if asked else "failed"), 0
         else:
             code = INTERRUPTED if hits else 4 if shown and shown.report.exit_code == 4 else 0
         if shown is None:

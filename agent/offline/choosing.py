@@ -45,28 +45,43 @@ class Step:
     arguments: dict[str, Any]
 
 
-def find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
+def find(
+    things: Sequence[Reference],
+    needed: int,
+    history: History,
+    answers: list[str] | None = None,
+) -> list[Found] | Step:
     """Return the candidates meant, as many as are needed, or the call that helps to find them.
 
     A question that is asked again says that the answer chose nothing.
+
+    Args:
+        answers: candidates that the person chose for these things or, after them, for others, in
+            order; those used are removed. If left out, all chosen ones are for these things.
     """
-    found = _find(things, needed, history)
+    if answers is None:
+        found = _find(things, needed, history, chosen_candidates(history, needed), sole=True)
+    else:
+        found = _find(things, needed, history, answers, sole=False)
     asked = [c for c in calls_in(history) if c.name == "ask_user" and c.arguments.get("candidates")]
     if isinstance(found, list) or found.name != "ask_user" or not asked:
         return found
-    if len(chosen_candidates(history, needed)) == len(asked):
-        return found  # each answer chose one, and this is about the next
-    answer = next((m.text for m in history if _answers(m, asked[-1])), "")
+    answered = next((k for k, m in enumerate(history) if _answers(m, asked[-1])), len(history))
+    before, now = (chosen_candidates(h, len(asked)) for h in (history[:answered], history))
+    if before != now:
+        return found  # the last answer chose one, and this is about the next
+    answer = "".join(m.text for m in history[answered : answered + 1])
     quoted = shorten(answer, MOST_QUOTED, placeholder=" ...")
     question = f'"{quoted}" chooses none of them. {found.arguments["question"]}'
     return Step(found.name, found.arguments | {"question": question})
 
 
-def _find(things: Sequence[Reference], needed: int, history: History) -> list[Found] | Step:
-    chosen = chosen_candidates(history, needed)
-    if len(chosen) >= needed:
+def _find(
+    things: Sequence[Reference], needed: int, history: History, chosen: list[str], *, sole: bool
+) -> list[Found] | Step:
+    if len(chosen) >= needed and (sole or len(things) < needed):
         label = things[0].wording if needed == len(things) == 1 else "the chosen thing"
-        return [Found(name, label, ()) for name in chosen]
+        return [Found(chosen.pop(0), label, ()) for _ in range(needed)]
     if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
         return _pair(things[0], history)
     if len(things) > needed:

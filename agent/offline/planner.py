@@ -15,16 +15,15 @@ from ..messages import Call, History, Message, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
 from .answering import arrived
-from .choosing import Found, Step, agrees, calls_in, declines, find, located_reasons, prompts_of
+from .choosing import Step, agrees, calls_in, declines, located_reasons, prompts_of
 from .conversing import conversed
-from .descriptions import Reference
 from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
 from .escorting import following
 from .followup_places import with_places
 from .followup_things import stood_about
+from .meant import things_meant
 from .pointed import chosen_by_answer, labelled, narrowed
 from .reading import Reading
-from .references import described
 from .restated import LEFT_OUT, Restated, is_question, restated
 from .sequences import in_stages, stages_of
 from .several import about_several
@@ -140,7 +139,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         ids = stood_about(reading.things, Standing.of(task.standing))[:needed]
     prompts = labelled([p for p in shown if p["id"] not in task.targets], reading.things)
     named = [] if others else [*reading.others, *([reading.faced] if reading.faced else [])]
-    found = _found(task, reading, named, history, pointed=bool(ids))
+    found = things_meant(task, reading, named, history, pointed=bool(ids))
     if isinstance(found, Step):
         return _call(found.name, found.arguments)
     if found:
@@ -151,24 +150,6 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if _was_doubted(history):
         contract["reading"] = READING
     return _call("propose_formation", {"contract": contract, "targets": prompts})
-
-
-def _found(
-    task: Task, reading: Reading, named: list[str], history: History, *, pointed: bool
-) -> list[Found] | Step:
-    """Return the things meant, then those in `named`, or the call that has to come first."""
-    found = [] if pointed else find(_things(task, reading), things_needed(reading), history)
-    if isinstance(found, Step):
-        return found
-    for phrase in named:
-        other = find(described([phrase]), 1, history)
-        if isinstance(other, Step) and pointed and not other.arguments:
-            question = f'Which thing is "{phrase}"? Mark it with --keep-out.'
-            return Step("ask_user", {"question": question})
-        if isinstance(other, Step):
-            return other
-        found += other
-    return found
 
 
 def _narrowed(task: Task, history: History) -> Task | Reply:
@@ -223,15 +204,6 @@ def _agreed(task: Task, history: History) -> Reply | None:
     things = read_instruction(task.instruction, task.metres_per_pixel).things
     prompts = labelled(prompts, things)
     return _call("propose_formation", {"contract": contract, "targets": prompts})
-
-
-def _things(task: Task, reading: Reading) -> tuple[Reference, ...]:
-    """Return what the phrases for things refer to; if none do, what the whole instruction does."""
-    if len(reading.things) == things_needed(reading) > 1:  # the second repeats nothing
-        each = [thing for phrase in reading.things for thing in described([phrase])]
-        if len(each) == len(reading.things):
-            return tuple(each)
-    return described(reading.things) or described([task.instruction])
 
 
 def _split_last(ids: list[str], last: int) -> tuple[list[str], list[str]]:

@@ -93,6 +93,15 @@ def test_the_next_line_is_the_answer(chat: Chat) -> None:
     assert made[1]["targets"][-1]["box"] == pytest.approx(asked[1]["box"], abs=3)
 
 
+def test_a_go_leaves_a_question_open_and_nothing_moves(chat: Chat) -> None:
+    lines = ["Surround the thing with 6 robots", "2", "keep clear of the flurb", "go"]
+    made = objects(chat([*lines, "never mind", "go"], "scene.png", "--json"))
+    assert [o["status"] for o in made[1:]] == [
+        "planned", "question", "question", "answered", "deployed"
+    ]  # fmt: skip
+    assert "A question is open" in made[3]["message"]
+
+
 def test_a_point_answers_or_goes_with_what_is_said_next(chat: Chat) -> None:
     lines = ["Surround the thing with 6 robots", "/point 270,145"]
     made = objects(chat(lines, "scene.png", "--json"))

@@ -254,6 +254,22 @@ def test_of_two_things_an_answer_settles_the_one_asked_about(
     assert [(t["label"], int(t["box"][0] / 10)) for t in run.report.targets] == left
 
 
+def test_one_answer_is_not_used_for_two_things() -> None:
+    words = "Surround the silver car with 6 robots, but stay clear of the red one"
+    run = Agent().run(load_picture(SMARTIES.with_name("cars_two.jpg")), words, settings=PLAN)
+    asked: list[str] = []
+    for answer in "121":
+        asked.append(run.report.message.partition(" is ")[2].partition("?")[0])
+        run = Agent().resume(run, answer=answer)
+    assert asked == ['"the silver car"', '"the silver car"', '"the red one"']
+    assert run.report.status == "planned"
+    (target, free) = run.report.targets
+    assert (target["label"], int(target["box"][0] / 100)) == ("silver car", 0)
+    assert (free["label"], int(free["box"][0] / 100)) == ("red one", 3)
+    assert run.report.contract is not None
+    assert list(run.report.contract.keep_out) == [free["id"]]
+
+
 @pytest.mark.parametrize(
     ("text", "word"), [("", "empty"), (" \n", "empty"), ("x" * 4001, "4,000"), ("\ud800", "UTF-8")]
 )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from .number_words import Number, numbers_in
+from .number_words import PARTS, Number, numbers_in
 
 Kind = Literal["number", "compound", "px", "m", "degrees", "share"]
 UNITS: tuple[tuple[str, Kind, float], ...] = (
@@ -28,8 +28,12 @@ UNIT = re.compile(
     re.IGNORECASE,
 )
 ONE = re.compile(
-    r"\ban?\s+(?=(?:(?:centi|deci|milli|kilo)?met(?:re|er)|yard|foot|inch|pixel)\b)", re.IGNORECASE
+    r"\ban?\s+(?:(?:good|full|whole|single)\s+)?"
+    r"(?=(?:(?:centi|deci|milli|kilo)?met(?:re|er)|yard|foot|inch|pixel)\b)",
+    re.IGNORECASE,
 )
+AND_PART = re.compile(rf"\s+and\s+(?:a|one)\s+({'|'.join(PARTS)})\b(?!\s+of\b)", re.IGNORECASE)
+"""The rest of "a metre and a half"."""
 SPLIT = re.compile(
     r"\b([0-9]+)\s?m\s?([0-9]{2})\b(?!\s*(?:px|pixels?|c?m|%|robots?)\b)", re.IGNORECASE
 )
@@ -123,5 +127,8 @@ def _with_unit(text: str, number: Number) -> Quantity:
         return Quantity(kind, number.least, number.most, wording, number.start, end)
     row = next(k for k in range(len(UNITS)) if unit[f"u{k}"])
     _, kind, factor = UNITS[row]
-    least, most = round(number.least * factor, 9), round(number.most * factor, 9)
-    return Quantity(kind, least, most, text[number.start : unit.end()], number.start, unit.end())
+    more, end = 0.0, unit.end()
+    if number.least == number.most and (part := AND_PART.match(text, end)):
+        more, end = 1 / PARTS[part[1].lower()], part.end()
+    least, most = (round((value + more) * factor, 9) for value in (number.least, number.most))
+    return Quantity(kind, least, most, text[number.start : end], number.start, end)
