@@ -88,7 +88,7 @@ class Frame:
             if kind in chunk.kinds and (kind in self.many or kind not in used):
                 kinds[k] = kind
                 return True
-        return any(kind in chunk.kinds for kind in common())
+        return "face" not in chunk.kinds and any(kind in chunk.kinds for kind in common())
 
 
 @cache

@@ -84,7 +84,7 @@ def not_that_side(slots: Slots, said: Utterance) -> Effects:
 def gap(slots: Slots, said: Utterance) -> Effects:
     """Leave a gap towards something, make it wider or narrower, or put it on the other side."""
     opening: Effect = {"kind": "opening"}
-    slots.has("gap")
+    slots.has("gap", "face")
     if "opposite" in slots or "otherway" in slots:
         return opposite(slots, said)
     if "there" in slots or "other" in slots or "thing" in slots:

@@ -120,7 +120,8 @@ def _read(words: str, standing: Standing | None) -> Followup:
         now = read_followup(sequence["now"] or sequence["lead"], standing)
         later = read_followup(sequence["rest"], standing)
         unclear = (f for f in (now, later) if f.kind in ("ask", "refuse", "instruction"))
-        return next(unclear, replace(now, rest=sequence["rest"]))
+        done = now.kind == "talk" and now.about == "already"
+        return next(unclear, later if done else replace(now, rest=sequence["rest"]))
     line = Line(words, standing or NOTHING)
     refused = impossible(line.chunks, standing) if standing else ""
     if refused:
