@@ -34,7 +34,7 @@ class MqttFleet(WireFleet):
         self.link = self._link = Link(
             settings.address, listened, self._heard, will=will, left=self.poses.forget
         )
-        self.see_tags()
+        self.begin()
 
     def send(
         self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]

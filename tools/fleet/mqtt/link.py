@@ -34,6 +34,8 @@ Heard = Callable[[str, bytes], None]
 class Link:
     """Says and hears messages, in a thread of its own that calls back.
 
+    It speaks and hears once it is started: what it calls must be set up before.
+
     Args:
         address: host, port, whether TLS is spoken; who logs in is in the environment.
         topics: what to listen to.
@@ -67,7 +69,11 @@ class Link:
         self._ended, self._closed = threading.Event(), threading.Event()
         self._client = self._made()
         self._thread = threading.Thread(target=self._keep, daemon=True)
+
+    def start(self) -> "Link":
+        """Connect, and call back from now on."""
         self._thread.start()
+        return self
 
     def say(
         self, topic: str, message: Mapping[str, Any], *, surely: bool = False, kept: bool = False

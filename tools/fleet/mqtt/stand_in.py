@@ -20,6 +20,7 @@ class MqttStandIns(StandIns):
         self._topics, self._robot_of = settings.topics, settings.robot_of
         listened = self._topics.goal.replace("{robot}", "+"), self._topics.hold
         self.link = self._link = Link(settings.address, listened, self._heard)
+        self._link.start()
 
     def say(self, robot: str, place: Point) -> None:
         """Say where a robot is seen; see `StandIns.say`."""

@@ -29,26 +29,31 @@ class StandInBridge:
 
     Attributes:
         joined, connected, trouble: as of what connects a fleet; it always is.
-
-    Raises:
-        InputError: the library is not installed, or something is there already.
     """
 
     joined, connected, trouble = 1, True, ""
 
     def __init__(self, address: tuple[str, int], heard: Callable[[Message], None]) -> None:
-        self._heard = heard
+        self._address, self._heard = address, heard
         self._listeners: dict[ServerConnection, set[str]] = {}
         self._kept = deque[tuple[float, Message]](maxlen=MOST_KEPT)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+
+    def start(self) -> None:
+        """Serve, and call back from now on.
+
+        Raises:
+            InputError: the library is not installed, or something is there already.
+        """
+        host, port = self._address
         self._thread.start()
         try:
-            self._server = self._soon(self._open(*address))
+            self._server = self._soon(self._open(host, port))
         except OSError as error:
             self._end()
             raise InputError(
-                f"Nothing can stand in for the bridge {address[0]}:{address[1]}: {error.strerror}."
+                f"Nothing can stand in for the bridge {host}:{port}: {error.strerror}."
             ) from None
 
     def publish(self, topic: str, message: Message) -> None:

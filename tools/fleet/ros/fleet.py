@@ -59,7 +59,7 @@ class RosFleet(WireFleet):
             self._heard,
             left=self.poses.forget,
         )
-        self.see_tags(self._judged)
+        self.begin(self._judged)
 
     def send(
         self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]

@@ -37,6 +37,8 @@ Message = Mapping[str, Any]
 class Link:
     """Says and hears operations of the rosbridge protocol.
 
+    It speaks and hears once it is started: what it calls must be set up before.
+
     Args:
         url: of the bridge.
         topics: what to listen to, and of which type it is.
@@ -78,7 +80,11 @@ class Link:
         self._loop = asyncio.new_event_loop()
         self._waiting: asyncio.Queue[tuple[float, Message] | None] = asyncio.Queue()
         self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def start(self) -> "Link":
+        """Connect, and call back from now on."""
         self._thread.start()
+        return self
 
     def say(self, *messages: Message, surely: bool = False) -> None:
         """Send operations, at once or not at all; those to arrive surely later, if need be."""

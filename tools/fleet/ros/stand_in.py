@@ -57,6 +57,7 @@ class RosStandIns(StandIns):
         self._topics = {robot: topic for topic, robot in settings.poses.items()}
         self._goals = settings.goals
         self.link = self._bridge = StandInBridge(settings.address, self._heard)
+        self._bridge.start()
 
     def step(self) -> None:
         """Let a step of time pass; see `StandIns.step`."""

@@ -56,7 +56,7 @@ class Vda5050Fleet(WireFleet):
         self._instant: dict[str, Instant] = {}
         listened = [settings.topic("+", kind) for kind in (*KINDS, *OF_MASTERS)]
         self.link = self._link = Link(settings.address, listened, self._heard, left=self._left)
-        self.see_tags(self._judged)
+        self.begin(self._judged)
 
     def send(
         self, drive: str, seq: int, goals: Mapping[str, Point], looks: Mapping[str, float]

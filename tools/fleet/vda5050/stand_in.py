@@ -37,6 +37,8 @@ class Vda5050StandIns(StandIns):
         self._joined = dict.fromkeys(self.robots, 0)
         self._links = {robot: self._linked(robot) for robot in self.robots}
         self.link = self._links[settings.robots[0]]
+        for link in self._links.values():
+            link.start()
 
     def step(self) -> None:
         """Let a step of time pass: vehicles go on, and say what is due."""

@@ -24,11 +24,12 @@ def checkup(
     """What is to be told, and whether all could be driven, after listening for so many seconds.
 
     Args:
-        link: listens, and feeds the poses where no camera does; is closed after.
+        link: listens, and feeds the poses where no camera does; is started, and closed after.
         others: robots that another program was heard to drive meanwhile.
         guard: how the link is guarded, in words.
         judge: what is believed of robots that a camera sees.
     """
+    link.start()
     watch = settings.camera and TagWatch(settings.camera, poses, judge)
     where = f"{settings.where[0].upper()}{settings.where[1:]}"
     try:

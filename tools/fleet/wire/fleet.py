@@ -79,6 +79,10 @@ class Connection(Protocol):
     connected: bool
     trouble: str
 
+    def start(self) -> object:
+        """Connect, and call back from now on."""
+        ...
+
     def close(self) -> None:
         """Say goodbye; what was said before still goes out."""
         ...
@@ -128,8 +132,12 @@ class WireFleet(ABC):
     def hold(self, reason: Reason) -> None:
         """Tell all robots to hold, at once; later, surely, where they cannot be told now."""
 
-    def see_tags(self, judge: Judge = all_believed) -> None:
-        """Have poses come from the camera from now on, where the file has one."""
+    def begin(self, judge: Judge = all_believed) -> None:
+        """Connect, and have poses come from the camera, where the file has one.
+
+        Messages come in threads of their own: all that they touch is there before.
+        """
+        self.link.start()
         if self.settings.camera is not None:
             self._tags = TagWatch(self.settings.camera, self.poses, judge)
             self.look = self._tags.top_view

@@ -71,7 +71,7 @@ class Lab(Simulated[Faulty]):
 
     def link(self, *topics: str, heard: Callable[[str, bytes], None] | None = None) -> Link:
         link = Link(self.settings.address, topics, heard or (lambda topic, payload: None))
-        self._links.append(link)
+        self._links.append(link.start())
         wait_for(lambda: link.connected)
         return link
 

@@ -47,6 +47,7 @@ class Faulty(RosStandIns):
 
     def restart_bridge(self) -> None:
         self.link = self._bridge = StandInBridge(self._ros.address, self._heard)
+        self._bridge.start()
 
     def result(self, status: int) -> None:
         robot, (goal, action) = next(iter(self._acting.items()))

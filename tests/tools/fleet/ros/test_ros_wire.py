@@ -74,6 +74,7 @@ def test_what_the_bridge_sends_that_is_no_message_is_not_read_and_its_complaints
         threading.Thread(target=serving.serve_forever).start()
         port = serving.socket.getsockname()[1]
         link = Link(f"ws://127.0.0.1:{port}", (), (), lambda m, new: heard.append((m["op"], new)))
+        link.start()
         ends = time.monotonic() + 5
         while len(heard) < 2 and time.monotonic() < ends:
             time.sleep(0.01)

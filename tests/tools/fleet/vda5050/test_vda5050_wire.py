@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from formup.tools.fleet.mqtt.link import Link
 from formup.tools.fleet.protocol import FleetStoppedError, Motion, StalePosesError
 from formup.tools.fleet.vda5050.checkup import checked
 from formup.tools.fleet.vda5050.messages import Writer, mistake
@@ -200,6 +201,22 @@ def test_a_vehicle_whose_state_is_not_known_is_asked_and_not_seen_before(
     assert lost.value.ids == ("b",)
     asked = [m["actions"][0]["actionType"] for t, m in said if t.endswith("b/instantActions")]
     assert asked and set(asked) == {"stateRequest"}
+    asyncio.run(fleet.close())
+
+
+def test_what_comes_while_a_fleet_is_still_being_opened_is_taken_in(
+    hall: Halls, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there, starts = hall().simulate(), Link.start
+
+    def slowly(link: Link) -> Link:
+        starts(link)
+        time.sleep(0.5)
+        return link
+
+    monkeypatch.setattr(Link, "start", slowly)
+    fleet = there.fleet()
+    assert len(asyncio.run(fleet.observe())) == 3
     asyncio.run(fleet.close())
 
 
