@@ -104,6 +104,9 @@ def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]
     inside = [labels[w.start] for w in words if quantity.start <= w.start < quantity.end]
     after = next((w.text for w in words if w.start >= quantity.end), "")
     following = [w.text for w in words if w.start >= quantity.end][: 3 if after.isalpha() else 0]
+    led = [labels[w.start] for w in words if w.end <= quantity.start][-1:]
+    if quantity.wording.lower() == "one" and "thing" in inside and led == ["thing"]:
+        return False  # "the red one with six robots"
     if "thing" in inside and not any(_robots().fullmatch(word) for word in following):
         return False
     if quantity.wording.lower() != "one":

@@ -11,8 +11,8 @@ from typing import Any
 from ...tools.formation.number_words import SMALL, TENS, numbers_in
 
 MAKE = (
-    r"\b(?:form|make|draw|build|be|want|trace|lay out|outline|like|do)(?:ing)?\s+(?:up\s+)?"
-    r"(?:in(?:to)?\s+)?"
+    r"\b(?:form|make|draw|build|be|want|trace|lay out|outline|like|do|turn|change)(?:ing)?\s+"
+    r"(?:(?:it|them|this|that|everyone)\s+)?(?:up\s+)?(?:in(?:to)?\s+|to\s+)?"
 )
 STAND = (
     r"(?P<kept>^\s*|[,.;:]\s*|\b(?:robots?|bots?|drones?|rovers?|agents?|units?|stand|arranged?|them"

@@ -248,6 +248,9 @@ def arrange(slots: Slots, said: Utterance) -> Effects:
         return target(slots, said)
     if relation == "between":
         return None
+    partly = said.standing.groups[0].get("sides")
+    if relation == "around" == said.standing.relation and partly and not named[1:]:
+        return [{"kind": "close"}]
     if relation == said.standing.relation and not slots.has("px", "flank", "side"):
         return [{"kind": "talk", "about": "already"}]
     demands = group_of(relation, slots)
@@ -281,7 +284,7 @@ def arranged(slots: Slots, said: Utterance) -> Effects:
     given = Slots({k: v for k, v in slots.items() if k not in ("num", "lone")})
     slots.used.update(slots)
     made = arrange(given, said)
-    if not made or made[0]["kind"] not in ("arrange", "talk"):
+    if not made or made[0]["kind"] not in ("arrange", "close", "talk"):
         return made
     edits = [e for e in made if e["kind"] != "talk"]
     counted: list[Effect] = [] if n == said.count else [{"kind": "count", "robots": n}]

@@ -23,6 +23,7 @@ PLACING = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 """A verb that, with robots, a number of them and a thing, makes a new instruction."""
+TOO = re.compile(r"\b(?:too|also|as well|aswell|in addition|additionally)\b", re.IGNORECASE)
 ALIKE = re.compile(r"\b(?:same|too|also|as well|likewise)\b", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
 DIRECTED = re.compile(r"^\W*(?:\w+ )?(?:(?P<up>up)|down) to\b", re.IGNORECASE)
@@ -233,6 +234,14 @@ def target(slots: Slots, said: Utterance) -> Effects:
             else None
         )
     moved: Effect = {"kind": "target", "to": to}
+    if to not in said.standing.targets and TOO.search(said.words):
+        at = to.removeprefix("?")
+        return ask(
+            f'The {said.count} robots there are stand already. For "{said.words}" too: some of '
+            "them, or more robots?",
+            f"half of them to {at}, the rest here",
+            f"{said.count} more around {at}",
+        )
     last = said.last[0] if len(said.last) == 1 else {}
     if "to" in last and last["kind"] == "add" and ALIKE.search(said.words):
         return [last | {"to": to}]

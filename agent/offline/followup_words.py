@@ -5,8 +5,8 @@ the frame that takes it decides. A word of no kind is "unknown", so that the per
 """
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -72,7 +72,19 @@ def chunks_of(text: str, standing: Standing) -> tuple[Chunk, ...]:
     while at < len(words):
         chunk, at = reader.read(at)
         found.append(chunk)
-    return tuple(found)
+    return tuple(_in_context(found, standing))
+
+
+def _in_context(chunks: Sequence[Chunk], standing: Standing) -> Iterator[Chunk]:
+    """Drop kinds that a phrase cannot be where it stands.
+
+    "All around" is not "about"; "both" are teams only where there are two.
+    """
+    for k, chunk in enumerate(chunks):
+        last = not chunks[k + 1 :] or not {"sep", "it"}.isdisjoint(chunks[k + 1].kinds)
+        wrong = {"about"} if "relation" in chunk.kinds and last else set[str]()
+        wrong |= {"team"} if "each" in chunk.kinds and len(standing.groups) < 2 else set()
+        yield replace(chunk, kinds={k: v for k, v in chunk.kinds.items() if k not in wrong})
 
 
 class _Reader:

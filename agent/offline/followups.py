@@ -354,8 +354,9 @@ def _not_framed(line: Line) -> Followup:
     group = contract_of(reading, reading.robots or len(line.standing.robots), [], [])["groups"][0]
     fields = {k: v for k, v in group.items() if (k, v) not in DEFAULTS}
     demands = {k: v for k, v in fields.items() if k not in ("robots", "targets")}
-    demands["shape"]["where"] = demands["shape"]["where"] or line.standing.beside
-    if demands["shape"]["where"] is None:
+    shape = demands["shape"]
+    shape["where"] = shape["where"] or line.standing.place_of(shape["kind"])
+    if shape["where"] is None:
         options = tuple(f"{text} on the {side}" for side in ("left", "right"))
         return _as_question(line, f'Where by it, in "{text}"?', options)
     edits: list[Effect] = [{"kind": "arrange", "demands": demands}]

@@ -88,6 +88,14 @@ class Standing:
         where: str | None = shape.get("where")
         return where or SIDES.get(str(group.get("side")))
 
+    def place_of(self, form: str) -> str | None:
+        """Return where another form is to be drawn: beside the target as now, or around it.
+
+        Only a closed form can stand instead of a ring.
+        """
+        ring = self.relation in ("around", "cage", "corners") and form in ("polygon", "star")
+        return self.beside or ("around" if ring else None)
+
     @property
     def targets(self) -> list[str]:
         """Ids of what the groups are about, in order, without repeats."""

@@ -264,7 +264,7 @@ def test_what_else_is_demanded(words: str, relation: str, fields: dict[str, Any]
         ("Stand in a semicircle around it, 9 of you", "arc", 9),
         ("Put 9 robots around it in a crescent", "arc", 9),
         ("Form a star around it with 10 robots", "star", 10),
-        ("Put 9 robots in a triangle around it", "polygon", 9),
+        ("Make it a triangle of 9 robots around it", "polygon", 9),
     ],
 )
 def test_forms_are_drawn(words: str, kind: str, robots: int) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import formup
 import pytest
 import yaml
+from formup.agent.offline.accounting import read_instruction
 from formup.agent.offline.demand_fields import LENGTHS, Fields
 from formup.agent.offline.demands import Demand, Item, demands_in, items_of, says_more, stops_in
 from formup.agent.offline.tagging import tag, tokens
@@ -171,3 +172,17 @@ def test_items_are_the_instruction_in_order() -> None:
             assert (item.quantity is None) == (
                 item.symbol not in ("<n>", "<l>", "<a>", "<s>", "<c>")
             )
+
+
+@pytest.mark.parametrize(
+    ("words", "thing", "robots"),
+    [
+        ("Surround the red one with six robots", "the red one", 6),
+        ("cage the big one with 12 bots, 30 px off", "the big one", 12),
+        ("surround the one on the left with 8 robots", "the one on the left", 8),
+        ("surround the tree with one robot", "the tree", 1),
+    ],
+)
+def test_a_one_in_place_of_a_noun_counts_no_robots(words: str, thing: str, robots: int) -> None:
+    reading = read_instruction(words)
+    assert ([*reading.things], reading.robots, [*reading.unread]) == ([thing], robots, [])
