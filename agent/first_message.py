@@ -102,10 +102,13 @@ def standing(context: Context) -> dict[str, Any] | None:
         return None
     formation = node.plan.formation
     back = len(context.steps) - 1 - world.undone
+    groups = zip(formation.contract.groups, formation.members, strict=False)
+    apart = [formation.robots[i] for g, own in groups if g.relation == "at" for i in own]
     return {
         "plan": node.plan.id,
         "contract": _rounded(to_json_values(formation.contract)),
         "robots": formation.robots,
+        **({"apart": apart} if 0 < len(apart) < len(formation.robots) else {}),
         "deployed": arrival_facts(world, node.plan)["arrived"],
         "last": {"words": node.words, "edits": json.loads(node.edit or "null")},
         "things": [

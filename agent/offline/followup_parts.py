@@ -196,3 +196,13 @@ def _moved(
                 edits.append({"kind": "target", "to": thing, "robots": going, **group})
                 now[thing], spare[source] = now.get(thing, 0) + going, spare[source] - going
     return edits or [{"kind": "talk", "about": "already"}]
+
+
+def rejoin(slots: Slots, said: Utterance) -> Effects:
+    """Take robots that stand by themselves back into the formation: "robot 3 back in"."""
+    slots.used.update(slots)
+    apart = {int(robot) for robot in said.standing.apart}
+    named = {robot for robots in slots.get("robots", ()) for robot in robots} or apart
+    kept = {*slots.get("relation", ())} <= {said.standing.relation}
+    inward = {*slots.get("radial", ())} <= {"in"}
+    return [{"kind": "merge"}] if apart and named == apart and kept and inward else None

@@ -252,6 +252,8 @@ def arrange(slots: Slots, said: Utterance) -> Effects:
     if relation == "around" == said.standing.relation and partly and not named[1:]:
         return [{"kind": "close"}]
     if relation == said.standing.relation and not slots.has("px", "flank", "side"):
+        if said.standing.apart:
+            return [{"kind": "merge"}]
         return [{"kind": "talk", "about": "already"}]
     demands = group_of(relation, slots)
     if len(said.standing.targets) > len(said.standing.groups) and len(current) == 1:

@@ -237,8 +237,8 @@ def target(slots: Slots, said: Utterance) -> Effects:
     if to not in said.standing.targets and TOO.search(said.words):
         at = to.removeprefix("?")
         return ask(
-            f'The {said.count} robots there are stand already. For "{said.words}" too: some of '
-            "them, or more robots?",
+            f'All {said.count} robots have places already. In "{said.words}", are some of them to '
+            "go there, or more robots to come?",
             f"half of them to {at}, the rest here",
             f"{said.count} more around {at}",
         )

@@ -16,6 +16,7 @@ class Standing:
         contract: of the plan, as JSON; lengths in px.
         robots: ids in the order of positions.
         deployed: whether the robots stand there.
+        apart: ids of robots that stand by themselves, each at a point of its own.
         said: words of the turn before, whatever their effect.
         words, edits: the last words that changed the plan, and the changes; none at first.
         things: ids and labels of what was measured.
@@ -32,6 +33,7 @@ class Standing:
     contract: Mapping[str, Any]
     robots: tuple[str, ...]
     deployed: bool = False
+    apart: tuple[str, ...] = ()
     words: str = ""
     edits: tuple[Mapping[str, Any], ...] = ()
     things: tuple[tuple[str, str], ...] = ()
@@ -55,6 +57,7 @@ class Standing:
             contract=facts["contract"],
             robots=tuple(facts["robots"]),
             deployed=facts.get("deployed", False),
+            apart=tuple(facts.get("apart", ())),
             words=last.get("words", ""),
             edits=tuple(last.get("edits") or ()),
             things=tuple((t["id"], t.get("label", "")) for t in facts.get("things", ())),

@@ -31,7 +31,7 @@ def standing(scene: str) -> Standing:
     given = dict(TABLE["scenes"][scene])
     count, groups = given.pop("robots"), given.pop("groups")
     things = tuple((name, label) for name, label in given.pop("things"))
-    for name in ("edits", "pointed", "place", "size"):
+    for name in ("edits", "pointed", "place", "size", "apart"):
         if name in given:
             given[name] = tuple(given[name])
     given["centre"] = {name: tuple(at) for name, at in given["centre"].items()}
