@@ -15,6 +15,9 @@ IntArray = NDArray[np.intp]
 CLEARLY = 1.5
 """An opening is at least this many times as wide as the widest other gap, along the ring."""
 
+WIDER = 1.1
+"""An opening so many times as wide as was asked is told of where the other gaps make it so."""
+
 
 def on_sides(part: Part, audit: Audit) -> None:
     """Check that no robot stands off the sides of the target that were named."""
@@ -92,6 +95,13 @@ def opening_left(part: Part, curve: Curve, audit: Audit) -> None:
     elif along < CLEARLY * gaps.max() - TOLERANCE:
         least = CLEARLY * gaps.max()
         audit.find("narrow_opening", along, least, robot=part.first + first, others=others)
+    forced = len(gaps) > 0 and along < WIDER * CLEARLY * gaps.max()
+    if group.opening and forced and width > WIDER * group.opening:
+        wide, asked = part.site.length(width), part.site.length(group.opening)
+        audit.notes.append(
+            f"The opening is {wide} wide, not {asked}: it is at least {CLEARLY:g} times as wide as "
+            "the other gaps. More robots would make all of them narrower."
+        )
     for k in np.flatnonzero(group.spacing == "even" and group.pitch is None and gaps >= 0):
         kind = "gap" if gaps[k] > WIDEST * gaps.mean() + TOLERANCE else "crowded"
         limit = (WIDEST if kind == "gap" else NARROWEST) * float(gaps.mean())

@@ -134,6 +134,14 @@ def test_an_opening_is_wide_enough_and_where_it_is_to_be(
     assert not ((ahead > 0) & (side < 15)).any()
 
 
+def test_an_opening_that_the_other_gaps_make_wider_than_asked_is_told_of() -> None:
+    site = site_of("disc")
+    few, many = (made(site, 3.0, robots=n, opening=30) for n in (6, 40))
+    assert any("not 30.0 px: it is at least 1.5 times" in note for note in few.verdict.notes)
+    assert not many.verdict.notes
+    assert few.verdict.certified and many.verdict.certified
+
+
 def test_a_ring_without_its_opening_or_with_it_elsewhere_is_refused() -> None:
     site = site_of("disc")
     plan = made(site, opening=60, opening_towards="left")
