@@ -9,6 +9,7 @@ from ..tools.errors import InputError
 from ..tools.world import Step, World
 from ..tools.world_changes import after_turns, with_changes
 from .messages import HISTORY, History, paired
+from .report import Since
 from .store.protocol import Event
 
 GOES_ON = ("turn", "resume", "message")
@@ -26,6 +27,7 @@ class State:
         steps: the steps that undo went through at that time.
         seconds: how long that turn has run, without pauses.
         end: how it ended; None if it was killed.
+        since: what a deployment beside the session has done after that.
     """
 
     facts: Mapping[str, Any]
@@ -37,6 +39,7 @@ class State:
     messages: History
     seconds: float
     end: Mapping[str, Any] | None
+    since: Since | None
 
 
 def stepped(steps: tuple[Step, ...], before: int, step: Step, undone: int) -> tuple[Step, ...]:
@@ -93,7 +96,8 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     if any(world.plans[name].plan.id != name for name in latest):  # others are checked when used
         raise InputError("Its plans were altered after formup wrote them; make them again.")
     messages = paired(read_messages(lines, artefacts))
-    return State(facts, settings, said["words"], world, began, steps, messages, seconds + last, end)
+    words, spent, since = said["words"], seconds + last, _since(events)
+    return State(facts, settings, words, world, began, steps, messages, spent, end, since)
 
 
 def _steps_before(
@@ -110,6 +114,22 @@ def _steps_before(
     for step, now in later:
         steps, undone = stepped(steps, undone, step, now), now
     return began, steps
+
+
+def _since(events: Sequence[Event]) -> Since | None:
+    """Return what a deployment beside the session has done since the last turn ended."""
+    since: Since | None = None
+    over = False
+    for event in events:
+        if event.kind in GOES_ON:
+            over, since = False, None
+        elif event.kind == "end":
+            over = True
+        elif over and event.kind == "moving":
+            since = "begun"
+        elif since and event.kind == "world" and "arrivals" in event.data["changes"]:
+            since = "ended"
+    return since
 
 
 def _begun(events: Sequence[Event]) -> Sequence[Event]:

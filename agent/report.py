@@ -13,7 +13,7 @@ from ..tools.formation.checking.verdict import Verdict
 from ..tools.formation.contract import Contract
 from ..tools.formation.encounters import notes_of
 from ..tools.formation.plan import Plan, Shortfall
-from ..tools.formation.units import in_metres, with_metres
+from ..tools.formation.units import in_metres, length_text, with_metres
 from ..tools.motion.checking import MotionVerdict
 from ..tools.outline_field import rounded_rings
 from ..tools.perception.referring.attributes import Candidate
@@ -32,6 +32,8 @@ Status = Literal[
     "stopped",
     "failed",
 ]
+Since = Literal["begun", "ended"]
+"""What a deployment beside a session has come to since the session's last turn ended."""
 EXIT_CODES: dict[Status, int] = {
     "deployed": 0,
     "planned": 0,
@@ -156,7 +158,12 @@ def candidate_choice(candidate: Candidate) -> dict[str, Any]:
 
 
 def make_report(
-    outcome: Outcome, context: Context, began: World, model: str, seconds: float
+    outcome: Outcome,
+    context: Context,
+    began: World,
+    model: str,
+    seconds: float,
+    since: Since | None = None,
 ) -> Report:
     """Return the report of a turn that ended with an outcome.
 
@@ -165,26 +172,24 @@ def make_report(
         began: the world when the turn began.
         model: the model's name.
         seconds: how long the turn has taken.
+        since: what a deployment has done after the turn's end.
     """
     world = context.world
     arrivals = {n: a for n, a in world.arrivals.items() if began.arrivals.get(n) is not a}
     plan = _plan(outcome, world, arrivals)
-    arrival = arrivals.get(plan.id) if plan else None
-    new = plan is not None and (
-        world.plans[plan.id] is not began.plans.get(plan.id)
-        or (world.undone != began.undone and plan.id == world.current)
-    )
+    arrival = arrivals.get(plan.id) if plan and since != "begun" else None
+    new = plan is not None and _is_new(plan, world, began)
     status, message = _status(outcome, plan, arrival, new=new)
-    if plan is not None and (new or arrival is not None):
-        message = _with_encounters(message, world.plans[plan.id])
-    notes, said = context.picture.notes, context.picture.metres_per_pixel
-    if said not in (None, world.metres_per_pixel):
-        notes = (*notes, f"{world.metres_per_pixel:g} m per pixel is used, as the person gave it")
+    if since is not None and plan is not None and not isinstance(outcome, Paused):
+        status, message = deployed_since(plan, arrival, world.metres_per_pixel)
+    verdict, motion = still_true(world.plans[plan.id], arrival) if plan else (None, None)
+    if plan is not None and verdict is not None and (new or arrival is not None):
+        message = _with_encounters(message, world.plans[plan.id], verdict)
     return Report(
         status=status,
         message=message,
         instruction=context.words,
-        image=world.picture.model_dump() | ({"notes": notes} if notes else {}),
+        image=_picture_data(context),
         targets=tuple(target_data(t) for t in world.targets),
         candidates=_candidates(outcome, context),
         options=_options(outcome),
@@ -194,14 +199,26 @@ def make_report(
         positions=plan.formation.positions if plan else None,
         headings_deg=(plan.formation.headings_deg or None) if plan else None,
         robots=plan.formation.robots or None if plan else None,
-        verdict=plan.verdict if plan else None,
-        motion=world.plans[plan.id].motion if plan else None,
+        verdict=verdict,
+        motion=motion,
         partial=plan.partial if plan else None,
         arrival=arrival,
         metric=metric_data(world, plan, arrival),
         model=model,
         usage=_totals(turn_of(outcome.messages), seconds),
     )
+
+
+def _is_new(plan: Plan, world: World, began: World) -> bool:
+    back = world.undone != began.undone and plan.id == world.current
+    return back or world.plans[plan.id] is not began.plans.get(plan.id)
+
+
+def _picture_data(context: Context) -> dict[str, Any]:
+    world, notes, said = context.world, context.picture.notes, context.picture.metres_per_pixel
+    if said not in (None, world.metres_per_pixel):
+        notes = (*notes, f"{world.metres_per_pixel:g} m per pixel is used, as the person gave it")
+    return world.picture.model_dump() | ({"notes": notes} if notes else {})
 
 
 def _plan(outcome: Outcome, world: World, arrivals: Mapping[str, Arrival]) -> Plan | None:
@@ -250,7 +267,7 @@ def _status(
     if isinstance(outcome, Paused):
         asked = outcome.call.name == "ask_user"
         return ("question" if asked else "needs_approval"), text
-    if arrival is not None and arrival.ended == "stopped":
+    if arrival is not None and arrival.stopped:
         return "stopped", text
     if arrival is not None and not (isinstance(outcome, Stopped) and outcome.kind == "fleet"):
         # Robots have moved, whatever happened after that.
@@ -277,10 +294,39 @@ def _with_arrival(outcome: Outcome, arrival: Arrival, text: str) -> str:
     return f"All robots had arrived. {text}"
 
 
-def _with_encounters(text: str, node: PlanNode) -> str:
-    """Return the message, adding the notes on encountered things that it does not contain yet."""
-    said = notes_of(node.encounters)
+def _with_encounters(text: str, node: PlanNode, verdict: Verdict) -> str:
+    """Return the message, adding the verdict's notes on encountered things that it lacks."""
+    said = [note for note in notes_of(node.encounters) if note in verdict.notes]
     return " ".join([text, *(note for note in said if note not in text)])
+
+
+def deployed_since(plan: Plan, arrival: Arrival | None, scale: float | None) -> tuple[Status, str]:
+    """Return status and message of a deployment; without an arrival it was broken off."""
+    if arrival is None:
+        return "stopped", (
+            f"Robots were sent to plan {plan.id}, and that was broken off on the way: "
+            "look where they stand."
+        )
+    state = "All arrived" if arrival.arrived else arrival.reason or "Not all arrived"
+    furthest = length_text(max(arrival.residual_px), scale)
+    told = [f"{state.rstrip('.')}; the furthest is {furthest} from its place."]
+    told += [arrival.follow.told(scale)] if arrival.follow else []
+    told += [f"The plan is partial: {plan.partial.sentence}"] if plan.partial else []
+    status: Status = "deployed" if arrival.done else "stopped" if arrival.stopped else "failed"
+    return status, " ".join(told)
+
+
+def still_true(node: PlanNode, arrival: Arrival | None) -> tuple[Verdict, MotionVerdict | None]:
+    """Return a plan's verdicts without what robots that were stopped on their way have voided.
+
+    That is the motion, from where they stood, and what they meet on it and at its end.
+    """
+    verdict = node.plan.verdict
+    if arrival is None or arrival.arrived:
+        return verdict, node.motion
+    met = notes_of(node.encounters)
+    notes = tuple(note for note in verdict.notes if note not in met)
+    return verdict.model_copy(update={"notes": notes}), None
 
 
 def _last_words(outcome: Outcome) -> str:

@@ -178,7 +178,8 @@ def load_run(
     )
     services.pictures[seen.sha256], services.artefacts = seen, artefacts
     context = Context(state.world, services, state.settings, state.words, steps=state.steps).check()
-    report = make_report(outcome, context, state.began, model_name(state.facts), state.seconds)
+    model = model_name(state.facts)
+    report = make_report(outcome, context, state.began, model, state.seconds, state.since)
     report = report.model_copy(update={"prompt": prompt, "prompts": prompts})
     return Run(report, outcome, context, state.began, stored, len(events))
 

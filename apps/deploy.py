@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from ..agent.recording import LogRecorder
-from ..agent.report import Report, metric_data, target_data
+from ..agent.report import Report, deployed_since, metric_data, still_true, target_data
 from ..agent.session import load_run
 from ..agent.store.folder import NAME, PICTURES, FolderArtefacts, FolderLog
 from ..tools.builtin.robots import drive_to, trajectories_to
@@ -20,12 +20,11 @@ from ..tools.context import Context, Settings
 from ..tools.errors import FleetError, InputError, ToolError
 from ..tools.fleet.follow import Follow
 from ..tools.formation.plan import Plan
-from ..tools.formation.units import length_text
 from ..tools.perception.image import load_picture
 from ..tools.store import StoredWorld, picture_of, plan_file, read_world, write_whole
 from ..tools.world import World
 from . import options as o
-from .run_display import show_report
+from .run_display import deploy_command, show_report
 from .run_files import write_films
 from .terminal import say
 from .window import watching
@@ -77,12 +76,17 @@ def deploy(
             context = context.at(_drive_robots(context, chosen, leave, plan, session, keep))
         films = write_films(plan.parent, film, context, chosen, context.words)
         report = _report(chosen, context.world, stored, films)
-        if as_json:
-            say(report.model_dump_json(indent=2))
-            say(f"formup: files in {plan.parent}", error=True)
-        else:
-            show_report(Console(highlight=False), report, str(plan.parent))
+        _show(report, plan, fleet, as_json)
         raise typer.Exit(report.exit_code)
+
+
+def _show(report: Report, plan: Path, fleet: str, as_json: bool) -> None:
+    if as_json:
+        say(report.model_dump_json(indent=2))
+        say(f"formup: files in {plan.parent}", error=True)
+    else:
+        again = deploy_command(plan, fleet)
+        show_report(Console(highlight=False), report, str(plan.parent), again)
 
 
 def _export_trajectories(context: Context, chosen: Plan, plan: Path, path: Path) -> int:
@@ -185,13 +189,11 @@ def _drive_robots(
 
 def _report(plan: Plan, world: World, stored: StoredWorld, films: dict[str, str | None]) -> Report:
     arrival = world.arrivals[plan.id]
-    state = "All arrived" if arrival.arrived else arrival.reason or "Not all arrived"
-    furthest = length_text(max(arrival.residual_px), world.metres_per_pixel)
+    status, message = deployed_since(plan, arrival, world.metres_per_pixel)
+    verdict, motion = still_true(world.plans[plan.id], arrival)
     return Report(
-        status="deployed" if arrival.done else "failed",
-        message=f"{state}; the furthest is {furthest} from its place."
-        + (f" {arrival.follow.told(world.metres_per_pixel)}" if arrival.follow else "")
-        + (f" The plan is partial: {plan.partial.sentence}" if plan.partial else ""),
+        status=status,
+        message=message,
         instruction=stored.instruction or "",
         image=world.picture.model_dump(),
         targets=tuple(target_data(t) for t in world.targets),
@@ -199,8 +201,8 @@ def _report(plan: Plan, world: World, stored: StoredWorld, films: dict[str, str 
         plan_id=plan.id,
         robots=plan.formation.robots or None,
         positions=plan.formation.positions,
-        verdict=plan.verdict,
-        motion=world.plans[plan.id].motion,
+        verdict=verdict,
+        motion=motion,
         partial=plan.partial,
         arrival=arrival,
         metric=metric_data(world, plan, arrival),

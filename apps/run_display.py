@@ -1,8 +1,10 @@
 """The report of a run on the terminal: things found, contract, certificate, arrival table."""
 
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -50,8 +52,12 @@ STATUS_STYLE = {
 }
 
 
-def show_report(console: Console, report: Report, folder: str) -> None:
-    """Print a report for a person."""
+def show_report(console: Console, report: Report, folder: str, again: str | None = None) -> None:
+    """Print a report for a person.
+
+    Args:
+        again: the command that goes on where `formup resume` would not, as the turn is over.
+    """
     console.print(styled(report.instruction, style="bold"))
     for note in (report.image or {}).get("notes", ()):
         _line(console, "picture", note)
@@ -72,7 +78,13 @@ def show_report(console: Console, report: Report, folder: str) -> None:
     )
     if report.candidates:
         _choices(console, report.candidates)
-    _files(console, report, folder)
+    _files(console, report, folder, again)
+
+
+def deploy_command(plan: Path, fleet: str) -> str:
+    """Return the command that sends a fleet's robots to a plan."""
+    words = ["formup", "deploy", str(plan)]
+    return shlex.join(words if fleet == "simulated" else [*words, "--fleet", fleet])
 
 
 def _show_target(console: Console, target: Mapping[str, Any]) -> None:
@@ -88,7 +100,7 @@ def _show_target(console: Console, target: Mapping[str, Any]) -> None:
         _line(console, "", note)
 
 
-def _files(console: Console, report: Report, folder: str) -> None:
+def _files(console: Console, report: Report, folder: str, again: str | None) -> None:
     """Print which files were written, and how to go on from there."""
     files = {name: file for name, file in (report.files or {}).items() if file}
     if report.contract is not None and "contract" in files:
@@ -100,8 +112,9 @@ def _files(console: Console, report: Report, folder: str) -> None:
         _line(console, "film", film)
     if files:
         _line(console, "files", f"{folder}/ {', '.join(files.values())}")
-    if files and report.status in GOING_ON:
-        _line(console, "continue", f"formup resume {folder}{GOING_ON[report.status]}")
+    if (files or again) and report.status in GOING_ON:
+        resume = f"formup resume {folder}{GOING_ON[report.status]}"
+        _line(console, "continue", again or resume)
 
 
 def at_terminal() -> bool:

@@ -5,13 +5,13 @@ from pathlib import Path
 from rich.console import Console
 
 from ..agent.agent import Agent
-from ..agent.outcomes import Cancelled
+from ..agent.outcomes import Answered, Cancelled
 from ..agent.report import Report
 from ..agent.session import Run
 from ..tools.errors import InputError
 from ..tools.store import write_whole
 from .main import INTERRUPTED
-from .run_display import ask, at_terminal, show_report
+from .run_display import ask, at_terminal, deploy_command, show_report
 from .run_files import Folder, write_files
 from .terminal import say
 
@@ -81,5 +81,7 @@ class TerminalSession:
             say(report.model_dump_json(indent=2))
             say(f"formup: files in {self._folder.path}", error=True)
         else:
-            show_report(Console(highlight=False), report, str(self._folder.path))
+            plan, fleet = self._folder.path / "plan.json", run.context.settings.fleet
+            again = deploy_command(plan, fleet) if isinstance(run.outcome, Answered) else None
+            show_report(Console(highlight=False), report, str(self._folder.path), again)
         return report

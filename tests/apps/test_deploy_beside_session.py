@@ -6,13 +6,16 @@ from pathlib import Path
 
 import pytest
 import typer
+from formup.agent.report import deployed_since, still_true
 from formup.agent.session import load_run
 from formup.agent.store.folder import FolderLog, read_events
 from formup.apps.cli import app
 from formup.apps.main import INTERRUPTED
 from formup.tools.errors import InputError, StorageError
+from formup.tools.fleet.follow import Followed
 from formup.tools.fleet.protocol import Motion, Pose
 from formup.tools.fleet.simulated import SimulatedFleet
+from formup.tools.formation.encounters import Encounter
 from formup.tools.store import read_world
 
 COINS = Path(__file__).parents[2] / "evals/photos/images/us_coins.jpg"
@@ -95,6 +98,65 @@ def test_an_interrupted_deploy_keeps_where_the_robots_stand(
     assert stored.world.robots == session.world.robots != before
     assert all(pose.seen > 0 for pose in stored.world.robots)
     assert stored.plan_id is not None
+    assert session.report.status == "stopped"
+    assert "broken off on the way: look where they stand" in session.report.message
+
+
+def stop_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have a person stop the simulated robots soon after they were sent off."""
+    drive = SimulatedFleet.drive
+
+    async def stopped(
+        self: SimulatedFleet, motion: Motion
+    ) -> AsyncGenerator[tuple[Pose, ...], None]:
+        async for poses in drive(self, motion):
+            yield poses
+            await self.stop()
+
+    monkeypatch.setattr(SimulatedFleet, "drive", stopped)
+
+
+def test_a_stopped_deploy_is_told_as_it_is_and_how_to_go_on(
+    planned: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    with monkeypatch.context() as patch:
+        stop_on_the_way(patch)
+        assert formup("deploy", planned / "plan.json", "--json") == 4
+    report = json.loads(capsys.readouterr().out)
+    assert (report["status"], report["motion"]) == ("stopped", None)
+    assert ".;" not in report["message"]
+    assert load_run(planned).report.message == report["message"]
+    assert formup("resume", planned) == 4
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "stopped on the way" in shown and "Nothing was moved" not in shown
+    assert f"continue formup deploy {planned / 'plan.json'}" in shown
+    assert formup("deploy", planned / "plan.json", "--json") == 0
+    arrived = json.loads(capsys.readouterr().out)["message"]
+    assert load_run(planned).report.message == arrived
+
+
+def test_what_robots_would_have_met_is_no_longer_told_once_they_are_stopped(
+    planned: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop_on_the_way(monkeypatch)
+    assert formup("deploy", planned / "plan.json", "--json") == 4
+    world = load_run(planned).world
+    met = Encounter(how="over", robots=("1",), thing="c9", label="coin")
+    node = world.plan()
+    noted = node.plan.verdict.model_copy(update={"notes": ("Kept.", met.sentence)})
+    plan = node.plan.model_copy(update={"verdict": noted})
+    node = node.model_copy(update={"plan": plan, "encounters": (met,)})
+    arrival = world.arrivals[plan.id]
+    verdict, motion = still_true(node, arrival)
+    assert (verdict.notes, motion) == (("Kept.",), None)
+    there = arrival.model_copy(update={"arrived": True, "ended": "arrived"})
+    assert still_true(node, there) == (noted, node.motion)
+    assert node.motion is not None
+    numbers = {"seconds": 1, "moved_px": 0, "speed_px_s": 0, "lag_px": 0, "certified": 1}
+    left = Followed(target="t1", separation_px=None, ended="stopped", reason="Held.", **numbers)
+    led = there.model_copy(update={"follow": left})
+    assert deployed_since(plan, led, None)[0] == "stopped"
 
 
 def test_a_plan_is_followed_with_for_so_long(

@@ -55,6 +55,11 @@ class Arrival(Value):
     follow: Followed | None = None
 
     @property
+    def stopped(self) -> bool:
+        """Whether a person's stop ended it, on the way or while robots followed."""
+        return "stopped" in (self.ended, self.follow and self.follow.ended)
+
+    @property
     def done(self) -> bool:
         """Whether all that was wanted was done."""
         return self.arrived and (self.follow is None or self.follow.ended == "time")

@@ -73,6 +73,13 @@ def test_what_a_file_leaves_out_is_as_without_one(tmp_path: Path) -> None:
         ("fleet: simulated\nfleet: simulated", "'fleet' is said more than once"),
         ("fleet: simulated\nnoise: {sensing: 1, sensing: 2}", "'sensing' is said more than once"),
         ("fleet: [simulated", "is not YAML"),
+        ("fleet: simulated\nlost: [{robot: 0017}]", "2 has 0017, .*number 15; put it in quotes if"),
+        ("fleet: simulated\ntargets: {00: {walk: 3}}", "line 2 has 00, .* else write 0"),
+        (
+            "fleet: simulated\nlost: [{robot: 12:34}]",
+            "12:34, which YAML reads as the number 754",
+        ),
+        ("fleet: simulated\nlost: [{robot: yes}]", "robot: .* string, got True: put it in quotes"),
         ("fleet: !!python/object:os.system {}", "is not YAML"),
         ("fleet: simulated\npace: slow", "pace is fast or real, got 'slow'"),
         ("fleet: simulated\nslipp: 0.1", "slipp: no such key"),

@@ -25,6 +25,8 @@ AGAIN = 0.5
 CONNECTING = 5.0
 MOST_BYTES = 65_536
 """Of a message; longer ones are not passed on by the broker."""
+UNSPECIFIED = 128
+"""The reason that the library gives where it knows none."""
 EXPIRY = 1
 """Seconds for which a broker keeps what it cannot pass on."""
 
@@ -171,9 +173,16 @@ class Link:
 
     def _went(self, client: "Client", data: Any, flags: Any, code: Any, more: Any) -> None:
         if self.connected:
-            self.connected, self.trouble = False, f"the connection broke: {code}"
+            self.connected, self.trouble = False, f"the connection broke{_cause(code)}"
             self._left()
         self._ended.set()
+
+
+def _cause(code: Any) -> str:
+    """Why a connection broke, after these words."""
+    if code.value == UNSPECIFIED:
+        return " without a word of the broker's"
+    return f": {code}"
 
 
 def _environment(word: str) -> str | None:

@@ -1,13 +1,14 @@
 """Looks at vehicles that speak VDA 5050: they are asked for their states, and told nothing."""
 
 import threading
+import time
 import uuid
 
 from ..mqtt.checkup import guarded
 from ..mqtt.link import Link
 from ..wire.checkup import checkup
 from ..wire.poses import PoseMessage, Poses
-from .hearing import KINDS, Hearing, error_told
+from .hearing import KINDS, Hearing, error_told, in_another_version
 from .messages import Writer, action
 from .settings import Vda5050Settings
 
@@ -29,7 +30,11 @@ def checked(settings: Vda5050Settings, seconds: float) -> tuple[list[str], bool]
     hearing = Hearing(settings, poses, ask)
 
     def heard(topic: str, payload: bytes) -> None:
-        if not topic.endswith("/order"):
+        if (level := topic.split("/")[1]) != settings.dialect.level:
+            if robot := hearing.robot_of(topic):
+                why = in_another_version(settings, payload) or f"in topics of {level}"
+                poses.heard(robot, why, time.monotonic())
+        elif not topic.endswith("/order"):
             with lock:
                 hearing.heard(topic, payload)
         elif robot := hearing.robot_of(topic):
@@ -39,7 +44,7 @@ def checked(settings: Vda5050Settings, seconds: float) -> tuple[list[str], bool]
         with lock:
             return hearing.seen(robot, seen)
 
-    listened = [settings.topic("+", kind) for kind in (*KINDS, "order")]
+    listened = [f"{settings.interface}/+/+/+/{kind}" for kind in (*KINDS, "order")]
     link = Link(settings.address, listened, heard)
     guard = guarded(settings.address[2])
     told, fit = checkup(settings, link, poses, others, seconds, guard, judged)
@@ -47,5 +52,6 @@ def checked(settings: Vda5050Settings, seconds: float) -> tuple[list[str], bool]
         f"Robot {robot} says: {error_told(error)}."
         for robot, vehicle in hearing.vehicles.items()
         for error in (vehicle.state or {}).get("errors", [])
+        if error["errorType"] != settings.dialect.idle  # it was told to hold, and stood already
     ]
     return told, fit

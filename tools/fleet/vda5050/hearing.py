@@ -4,6 +4,7 @@ A place is believed only while the state of the vehicle is known too: one that s
 and not whether a person has switched it to manual, is not seen.
 """
 
+import json
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -21,7 +22,7 @@ KINDS = ("state", "visualization", "connection")
 STATE_AGE = 35.0
 """A state comes every 30 s at the latest; after so many it is not known."""
 ASK_AGAIN = 1.0
-MOST_WORDS = 200
+MOST_WORDS, MOST_OF_VERSION = 200, 20
 
 
 @dataclass
@@ -83,7 +84,7 @@ class Hearing:
             return None
         message = read(self._settings.version, kind, payload)
         if message is None or not self._its_own(robot, message):
-            self._poses.heard(robot, None, now)
+            self._poses.heard(robot, in_another_version(self._settings, payload), now)
             return None
         vehicle = self.vehicles[robot]
         if kind == "connection":
@@ -163,6 +164,16 @@ class Hearing:
         if (where := position["mapId"]) != self._settings.map:
             words.append(f"on the map {where!r}, not {self._settings.map!r}")
         return words
+
+
+def in_another_version(settings: Vda5050Settings, payload: bytes) -> str | None:
+    """Why a message is not believed, if its header says another version than the file."""
+    try:
+        version = str(json.loads(payload)["version"])[:MOST_OF_VERSION]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+    other = version.partition(".")[0] != settings.version.partition(".")[0]
+    return f"in VDA 5050 {version}, where the file says {settings.version}" if other else None
 
 
 def hindrances(dialect: Dialect, state: Mapping[str, Any]) -> list[str]:

@@ -34,7 +34,7 @@ from ..protocol import (
     points_of,
 )
 from ..seen_things import Look, SeenThings
-from .poses import Poses
+from .poses import Poses, told_of
 from .settings import WireSettings
 from .tagged import Judge, TagWatch, all_believed
 
@@ -58,11 +58,9 @@ LATE, LISTENING = 0.25, 0.3
 may have stopped the robots meanwhile."""
 OTHERS = 2.0
 """Seconds after which another program that sent goals is taken to have ended."""
-MOST_TOLD = 5
-"""Robots that an error speaks of at length; it names all."""
+STOOD_STILL = 1.0
+"""A connection that is lost when this program went on after so many seconds was lost by that."""
 Reason = Literal["stop", "end", "gone"]
-
-
 Point = tuple[float, float]
 
 
@@ -110,7 +108,7 @@ class WireFleet(ABC):
         self.tracking_error = settings.pixels(settings.tracking_error)
         self.stopped, self._stops = False, 0
         self._driving = self._closed = False
-        self._others = -OTHERS
+        self._others, self._late = -OTHERS, 0.0
         self.poses = Poses(settings)
         self._things: SeenThings | None = None
         self._tags: TagWatch | None = None
@@ -220,7 +218,8 @@ class WireFleet(ABC):
             joined, due = self.link.joined, time.monotonic()
             before = due
             for seq in itertools.count(1):
-                if time.monotonic() > before + self.settings.period + LATE:
+                self._late = time.monotonic() - before - self.settings.period
+                if self._late > LATE:
                     await asyncio.sleep(LISTENING)
                 before = time.monotonic()
                 poses = self.poses.seen()
@@ -234,7 +233,7 @@ class WireFleet(ABC):
             if begun:
                 self.hold("end")
                 await self._until_still()
-            self._driving = False
+            self._driving, self._late = False, 0.0
 
     async def stop(self) -> None:
         """Tell all robots to hold, at once, until `release`."""
@@ -298,6 +297,8 @@ class WireFleet(ABC):
         link = self.link
         if not link.connected or link.joined != joined:
             why = link.trouble or "the connection was lost and is back"
+            if self._late > STOOD_STILL:
+                why = f"the connection was lost while this program stood still ({self._late:.0f} s)"
             where, alone = self.settings.where, self.settings.alone
             raise FleetUnreachableError(
                 f"{where[0].upper()}{where[1:]} is out of reach: {why}. {alone[0].upper()}"
@@ -315,19 +316,18 @@ class WireFleet(ABC):
         if time.monotonic() - self._others < OTHERS:
             raise FleetBusyError("Another program drives these robots; end it, and drive again.")
         self._check_seen(self.settings.pose_timeout)
-        faults = {r: self.poses.tracks[r].fault for r in robots}
-        failed = {robot: fault for robot, fault in faults.items() if fault}
+        failed = {r: fault for r in robots if (fault := self.poses.tracks[r].fault)}
         if failed:
-            told = [f"Robot {robot} cannot drive: {fault!r}." for robot, fault in failed.items()]
-            raise RobotsFailedError(" ".join(told[:MOST_TOLD]), tuple(failed))
+            told = {robot: f"Robot {robot} cannot drive: {failed[robot]!r}." for robot in failed}
+            raise RobotsFailedError(told_of(told), tuple(failed))
 
     def _check_seen(self, limit: float) -> None:
         old = self.poses.old(time.monotonic(), limit)
         if old:
-            told = " ".join([*old.values()][:MOST_TOLD]) + self.poses.trouble
             raise StalePosesError(
-                f"{told} Nothing is driven while a robot is not seen: see to it ({len(old)} of "
-                f"{len(self.settings.robots)}), or take those that are away out of the file.",
+                f"{told_of(old)}{self.poses.trouble} Nothing is driven while a robot is not seen: "
+                f"see to it ({len(old)} of {len(self.settings.robots)}), or take those that are "
+                "away out of the file.",
                 tuple(old),
             )
 

@@ -23,6 +23,8 @@ JITTER = 0.2
 MOST_JUMPS = 3
 """A robot that jumps so often within `pose_timeout` may be two of one name: it is not believed."""
 MOST_UNKNOWN = MOST_REASONS = 20
+MOST_TOLD = 5
+"""Robots that are spoken of at length; the others are named."""
 
 
 class PoseMessage(BaseModel):
@@ -164,3 +166,10 @@ class Poses:
         why = f"; its last message was {track.why}" if track.why else ""
         why += f"; it cannot drive: {track.fault!r}" if track.fault else ""
         return f"Robot {robot} {seen}{why}."
+
+
+def told_of(robots: Mapping[str, str]) -> str:
+    """Sentences on the first robots, by id, and the names of all others."""
+    more = [*robots][MOST_TOLD:]
+    likewise = [f"Likewise robot {', '.join(more)}."] if more else []
+    return " ".join([*[*robots.values()][:MOST_TOLD], *likewise])

@@ -6,7 +6,8 @@ import time
 from collections.abc import Iterable
 
 from ..protocol import Pose
-from .fleet import MOST_TOLD, SETTLED, WAIT, WireFleet
+from .fleet import SETTLED, WAIT, WireFleet
+from .poses import told_of
 
 AGAIN = 0.5
 """Seconds after which robots are told again, as some may not have heard,"""
@@ -66,8 +67,9 @@ async def stopped(fleet: WireFleet) -> tuple[list[str], bool]:
     robots = len(fleet.settings.robots)
     told = [f"Robot {', '.join(moving)} still moves: hold it by hand."] if moving else []
     if unseen:
-        why = " ".join([*unseen.values()][:MOST_TOLD]) + fleet.poses.trouble
-        told.append(f"{why} Whether it stands cannot be told from here: look at it.")
+        it, stands = ("it", "it stands") if len(unseen) == 1 else ("them", "they stand")
+        why = told_of(unseen) + fleet.poses.trouble
+        told.append(f"{why} Whether {stands} cannot be told from here: look at {it}.")
     standing = robots - len(moving) - len(unseen)
     stand = "all stand" if standing == robots else f"{standing} of them are seen to stand"
     told.append(

@@ -68,6 +68,18 @@ def test_a_mistake_is_found_before_a_broker_is_looked_for(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("line", ["map: 0017", "vehicles: {a: {serial: 0017}}", "robots: [0017]"])
+def test_a_serial_number_is_not_read_as_another_number(tmp_path: Path, line: str) -> None:
+    path = written(tmp_path, **{line.partition(":")[0]: None})
+    plain = path.read_text()
+    path.write_text(plain + line)
+    with pytest.raises(InputError, match="0017, which YAML reads as the number 15; put it in q"):
+        described_as(Vda5050Settings, path)
+    path.write_text(plain + line.replace("0017", '"0017"'))
+    found = described_as(Vda5050Settings, path)
+    assert "0017" in (found.map, *(name for robot in found.robots for name in found.named(robot)))
+
+
 def test_a_name_alone_does_not_do() -> None:
     with pytest.raises(InputError, match=r"The fleet 'vda5050' is described by a file"):
         fleet_named("vda5050")

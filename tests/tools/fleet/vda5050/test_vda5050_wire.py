@@ -228,6 +228,7 @@ def test_a_look_says_who_is_there_and_what_is_wrong(hall: Halls) -> None:
     vehicles["c"].mode = "MANUAL"
     vehicles["d"].localised = False
     vehicles["a"].complain("maintenance")
+    vehicles["a"].complain(there.settings.dialect.idle)
     before = there.robots.points.copy()
     told, fit = checked(there.settings, 1.5)
     said = "\n".join(told)
@@ -238,6 +239,7 @@ def test_a_look_says_who_is_there_and_what_is_wrong(hall: Halls) -> None:
     assert "Robot c cannot drive: 'operating mode MANUAL'" in said
     assert "Robot d not seen yet; it cannot drive: 'not localised" in said
     assert "Robot a says: maintenance (WARNING)." in said
+    assert "Robot a says: noOrderToCancel" not in said
     assert "last node released to them, at most 0.5 s away, and stand" in said
     assert said.endswith("1 of 4 robots can be driven.")
     faults.clear()
@@ -245,6 +247,20 @@ def test_a_look_says_who_is_there_and_what_is_wrong(hall: Halls) -> None:
         vehicle.mode, vehicle.localised = "AUTOMATIC", True
     assert checked(there.settings, 1.5)[1]
     assert not (there.robots.points - before).any()
+
+
+def test_a_look_says_which_other_version_vehicles_speak(hall: Halls) -> None:
+    there = hall().simulate()
+    file = there.settings.model_copy(update={"version": "3.0"})
+    told, fit = checked(file, 1.5)
+    assert not fit
+    assert "Robot a not seen yet; its last message was in VDA 5050 2.1.0, where the f" in told[1]
+    faults: dict[str, Fault] = there.robots.faults
+    faults["b"] = lambda kind, message: message | {"version": "3.0.0"}
+    told, fit = checked(there.settings, 1.5)
+    assert not fit
+    assert "in VDA 5050 3.0.0, where the file says 2.1" in told[2]
+    assert "refused" not in told[1]
 
 
 def test_a_look_says_who_else_speaks(hall: Halls) -> None:
