@@ -217,7 +217,7 @@ def test_a_chat_copied_under_another_name_goes_on_in_a_session_of_its_own(
     for name, session in (("one", first), ("two", second)):
         alone = chat(url).say("undo", metadata={"chat_id": name})
         assert session_of(alone) == session
-    assert turns(store) == dict.fromkeys((first, second), [CAGE, "a bit closer", "undo"])
+    assert turns(store) == {s: [CAGE, "a bit closer", "undo"] for s in (first, second)}
 
 
 def test_a_session_that_was_deleted_is_told(serve: Serve, chat: Any, store: Store) -> None:
