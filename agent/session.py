@@ -224,7 +224,7 @@ def stored_picture(
             if facts["path"] is None or not Path(facts["path"]).is_file():
                 raise InputError(
                     f"The picture {facts['name']} is neither beside the log nor where it lay; "
-                    "give the picture itself."
+                    "give it as the image."
                 ) from None
             given = load_picture(facts["path"])
     if given.sha256 != wanted:
