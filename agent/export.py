@@ -7,6 +7,7 @@ import io
 import json
 import re
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from ..tools.perception.image import Picture
 from ..tools.store import write_whole
 from ..tools.world import World
 from ..tools.world_changes import with_changes
-from .session import load_run, model_name
+from .session import load_run, model_name, stored_picture
 from .session_start import read_session
 from .store.folder import PICTURES, log_path, suffix_of
 from .store.folder_store import write_session
@@ -66,7 +67,10 @@ def export_page(session: StoredSession, folder: Path) -> Path:
         InputError: the picture is missing.
     """
     start, *events = read_session(session)
-    picture = load_run(session).context.picture
+    if events:
+        picture = load_run(session).context.picture
+    else:  # nothing was said yet
+        picture = stored_picture(start.data["picture"], session.artefacts, None)
     path = _not_there(_existing(folder) / PAGE)
     (folder / PICTURES).mkdir(exist_ok=True)
     facts = picture.width, picture.height, model_name(start.data)
@@ -88,7 +92,7 @@ def export_page(session: StoredSession, folder: Path) -> Path:
 
 def _by_turns(events: Sequence[Event]) -> Iterator[Sequence[Event]]:
     starts = [place for place, event in enumerate(events) if event.kind == "turn"]
-    for first, after in zip(starts, [*starts[1:], len(events)], strict=True):
+    for first, after in pairwise([*starts, len(events)]):
         yield events[first:after]
 
 

@@ -62,5 +62,5 @@ async def reply_in_time(model: Model, request: Request, seconds: float | None) -
             raise
         raise ModelError(
             f"{model.name} did not finish a reply within {seconds:g} s; "
-            "ask again, or allow it more with --limit reply_seconds=NUMBER."
+            "ask again, or raise the limit reply_seconds."
         ) from None

@@ -225,7 +225,7 @@ def stored_picture(
             if facts["path"] is None or not Path(facts["path"]).is_file():
                 raise InputError(
                     f"The picture {facts['name']} is neither beside the log nor where it lay; "
-                    "name it with --image."
+                    "give it as the image."
                 ) from None
             given = load_picture(facts["path"])
     if given.sha256 != wanted:
@@ -261,8 +261,8 @@ def answered_by(
             raise InputError(f"The run asked nothing: it is {run.report.status}.")
         if isinstance(outcome, Answered):
             raise InputError(
-                f"The run is over: it is {run.report.status}; say what to do next, as in formup "
-                'resume FOLDER "and now the other one".'
+                f"The run is over: it is {run.report.status}; say what to do next, such as "
+                '"and now the other one".'
             )
         return None, None
     call = outcome.call

@@ -115,7 +115,7 @@ def picture_of(stored: StoredWorld, path: Path, given: Picture | None = None) ->
         if beside is None and (lay is None or not lay.is_file()):
             where = f": it is no longer at {lay}" if lay else ""
             raise ImageError(
-                f"The picture of {path} is not beside it{where}; name it with --image."
+                f"The picture of {path} is not beside it{where}; give it as the image."
             )
         given = load_picture(beside or cast(Path, lay))
     if given.sha256 != wanted:

@@ -6,10 +6,9 @@ from typing import Any
 from ...tools.formation.contract import MAX_ROBOTS
 from ..first_message import Task
 from .drawn_forms import BESIDE, ENCLOSING, SIDES
-from .reading import Reading
+from .reading import Reading, unscaled
 
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
-UNSCALED = "Metres take a picture of known scale: run again with --metres-per-pixel."
 LEAST_CAGE = 3
 LIKELY_PLACE = 0.3
 """Least probability of another arrangement at which it says where a form is drawn."""
@@ -153,7 +152,7 @@ def _foreign(reading: Reading) -> str | None:
         return None
     return (
         f"That seems to be {reading.language}; the offline planner reads English alone. Say it in "
-        "English, or name a language model with --model."
+        "English, or have a language model decide."
     )
 
 
@@ -169,7 +168,7 @@ def _stopped(reading: Reading) -> str | None:
 
 def _not_understood(reading: Reading, robots: int | None) -> str | None:
     if reading.unscaled:
-        return f'"{reading.unscaled[0]}" cannot be measured: {UNSCALED[0].lower()}{UNSCALED[1:]}'
+        return unscaled(reading.unscaled[0])
     if not reading.unread:
         return None
     quoted = " and ".join(f'"{words}"' for words in reading.unread)

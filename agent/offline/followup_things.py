@@ -8,6 +8,7 @@ from .followup_edits import SIDE_OF, listed
 from .followup_words import Chunk
 from .phrases import phrase as thing_phrase
 from .phrases import table
+from .reading import unscaled
 from .standing import Standing
 
 POINTING = ("that", "this", "here")
@@ -111,10 +112,7 @@ def impossible(chunks: Sequence[Chunk], standing: Standing) -> str:
         if strange:
             return f"There is no robot {strange[0]}: there are {_span(there)}. Name one of those."
         if "m" in chunk.kinds:
-            return (
-                f'"{chunk.kinds["m"]}" cannot be measured: the picture has no scale. Say it in px, '
-                "or give the scale with --metres-per-pixel."
-            )
+            return unscaled(chunk.kinds["m"])
         if name.startswith("t") and name not in known:
             there_are = f"known are {listed(sorted(known))}"
             return f"There is no {name}: {there_are}. Point at it, or name it in words."

@@ -278,7 +278,8 @@ def units(slots: Slots, said: Utterance) -> Effects:
     """Give lengths in metres if the picture has a scale, else refuse."""
     if said.standing.metres_per_pixel is None:
         return refuse(
-            "The picture has no scale, so lengths are px; give it with --metres-per-pixel."
+            "The picture has no scale, so lengths are px; metres take a picture that was given "
+            "with its scale, in metres per pixel."
         )
     return [{"kind": "query", "about": "distance"}]
 

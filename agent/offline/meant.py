@@ -21,7 +21,7 @@ def things_meant(
     for phrase in named:
         other = find(described([phrase]), 1, history, answers)
         if isinstance(other, Step) and pointed and not other.arguments:
-            question = f'Which thing is "{phrase}"? Mark it with --keep-out.'
+            question = f'Which thing is "{phrase}"? Mark it as one to keep out of.'
             return Step("ask_user", {"question": question})
         if isinstance(other, Step):
             return other

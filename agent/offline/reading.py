@@ -11,6 +11,14 @@ SURE_RING, SURE_EITHER_RING = 0.45, 0.8
 """Least probabilities of the likelier kind of ring, and of both kinds together."""
 
 
+def unscaled(words: str) -> str:
+    """Return why a metric length cannot be used where the picture has no scale."""
+    return (
+        f'"{words}" cannot be measured: the picture has no scale. Say it in px; metres take a '
+        "picture that was given with its scale, in metres per pixel."
+    )
+
+
 @dataclass
 class Reading:
     """What was understood of an instruction.

@@ -271,7 +271,7 @@ def files_named(events: Sequence[Event], files: Files) -> tuple[bytes, ...]:
 def missing(label: str) -> StorageError:
     """Return the error for a session that is not in its store."""
     return StorageError(
-        f"{label} is not there; formup sessions list names those that are.", "missing"
+        f"{label} is not there; the list of sessions has those that are.", "missing"
     )
 
 

@@ -108,7 +108,7 @@ def staged(
     if blind:
         raise InputError(
             f"{blind[0]} reads no prompt and cannot share the work: "
-            "--model and --planner both take a language model, such as openai:NAME."
+            "model and planner are both language models, such as openai:NAME."
         )
     names = {"look": "context", "plan": plan, "repair": "repair", "revise": "revise"}
     prompts = {use: prompt_named(library, name) for use, name in names.items()}

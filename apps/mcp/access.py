@@ -127,5 +127,6 @@ def _inside(image: str, folders: Sequence[Path]) -> Path:
         pass  # not a path at all
     there = ", ".join(map(str, folders))
     raise InputError(
-        f"{image[:200]!r} is not inside {there}; formup mcp --pictures DIR allows another folder."
+        f"{image[:200]!r} is not inside {there}; put the picture there, or have the server "
+        "started with its folder."
     )

@@ -10,11 +10,16 @@ from mcp.server import MCPServer
 from mcp.server.auth.middleware.auth_context import AuthContextMiddleware
 from mcp.server.auth.middleware.bearer_auth import AuthenticatedUser
 from mcp.server.auth.provider import AccessToken
+from mcp.server.mcpserver import Context
+from mcp.server.mcpserver.exceptions import ToolError, UnexpectedToolError
 from mcp.server.transport_security import TransportSecuritySettings
+from mcp_types import CallToolResult, InputRequiredResult
+from pydantic import ValidationError
 from starlette.applications import Starlette
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
+from ...tools.tool import violations
 from ..server.hub import Hub
 from ..server.tokens import Person
 from .access import Access
@@ -29,6 +34,22 @@ INSTRUCTIONS = (
 )
 
 
+class _Server(MCPServer[Access]):
+    """A server that says in one sentence which arguments a call lacks, or has wrong."""
+
+    async def call_tool(
+        self, name: str, arguments: dict[str, Any], context: Context[Access, Any] | None = None
+    ) -> CallToolResult | InputRequiredResult:
+        try:
+            return await super().call_tool(name, arguments, context)
+        except ToolError as error:
+            wrong = error.__cause__
+            if isinstance(error, UnexpectedToolError) or not isinstance(wrong, ValidationError):
+                raise
+            told = f"{name} cannot be called with these arguments: {violations(wrong)}"
+            raise ToolError(told) from wrong
+
+
 def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
     """Return an MCP server with the tools and resources.
 
@@ -41,7 +62,7 @@ def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
     async def lifespan(server: MCPServer[Access]) -> AsyncGenerator[Access]:
         yield access
 
-    server = MCPServer[Access](
+    server = _Server(
         "formup",
         version=version("formup"),
         instructions=INSTRUCTIONS,

@@ -35,7 +35,7 @@ NO_GO = (
 )
 NO_FORM = "This client cannot ask a person: let one approve the plan with "
 OVER_HTTP = f"{NO_FORM}POST /api/sessions/{{}}/approvals; then call status. "
-OVER_STDIO = f"{NO_FORM}/approve in formup chat --session {{}}, once this client has ended. "
+OVER_STDIO = f"{NO_FORM}/approve in a terminal's chat of session {{}}, once this client has ended. "
 ASession = Annotated[str, Field(max_length=100, description="id from open_scene")]
 AKey = Annotated[Key, Field(description="of your choice; reuse it only to repeat this very call")]
 Detail = Annotated[bool, Field(description="also contract, positions, certificate, arrival")]

@@ -17,7 +17,7 @@ const metres = () => app.scene.metres_per_pixel;
 const length = (px) => (metres() ? `${(px * metres()).toFixed(2)} m` : `${px.toFixed(0)} px`);
 
 const way = ({ motion }) => motion && motion.makespan_s > 0
-  ? `The longest way is ${length(motion.longest_px)}, ${seconds(motion.makespan_s)}.` : "";
+  ? `The longest path is ${length(motion.longest_px)}, ${seconds(motion.makespan_s)}.` : "";
 
 const told = (found) => {
   const { plan } = app.scene, shown = found ?? plan;
@@ -142,6 +142,10 @@ on("scene", () => {
 const usable = () => {
   const ready = app.scene?.plan && !app.busy && !app.looking && !app.moving;
   byId("go").disabled = !ready || app.scene.plan.void || !app.scene.plan.certified;
+  const may = ["move", "approve"].includes(app.state?.scope);
+  byId("go").hidden = !may;
+  byId("may-not").hidden = may;
+  byId("may-not").textContent = `Your token has the scope ${app.state?.scope}; moving the robots needs move.`;
   byId("go").textContent = app.state?.waits ? "Approve …" : "Move the robots …";
   for (const name of ["undo", "redo"]) byId(name).disabled = app.busy || app.moving;
   for (const input of sliders.querySelectorAll("input")) input.disabled = app.moving;

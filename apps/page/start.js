@@ -104,6 +104,8 @@ const pickers = async () => {
 
 const signedIn = () => new Promise((over) => {
   const dialog = byId("sign-in");
+  byId("not-accepted").hidden = !token.get();
+  byId("token").value = "";
   dialog.addEventListener("close", () => (token.set(byId("token").value), over()), { once: true });
   dialog.showModal();
 });

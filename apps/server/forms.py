@@ -9,6 +9,7 @@ from ...agent.report import Report
 from ...agent.session import Run
 from ...tools.formation.editing.edit_kinds import Edit
 from ...tools.perception.target_prompt import TargetPrompt
+from .tokens import Scope
 
 Key = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[\x21-\x7e]+$")]
 Words = Annotated[str, Field(min_length=1, max_length=20_000)]
@@ -165,6 +166,7 @@ class SessionState(BaseModel):
     """The current state of a session.
 
     Attributes:
+        scope: of the token that asks.
         events: the number of its last event, after which an event stream can continue.
         under_way: the turn that is running in this process.
         last: the report of the last turn.
@@ -174,6 +176,7 @@ class SessionState(BaseModel):
 
     id: str
     agent: str
+    scope: Scope
     events: int
     under_way: TurnState | None
     last: Report | None

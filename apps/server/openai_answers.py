@@ -4,7 +4,6 @@ A turn goes on if its client disconnects, and the same request sent again finds 
 """
 
 import asyncio
-import base64
 import hashlib
 import io
 import logging
@@ -26,8 +25,16 @@ from ..run_display import choice_words
 from ..run_files import draw_choices
 from .hub import Hub, asked_by, check_owner, require_scope
 from .openai_chores import chore
-from .openai_places import PICTURE, find_session, name_of, person_lock, recently_opened, run_at
-from .openai_request import ChatRequest, Message, Place, digest
+from .openai_places import (
+    OPENED,
+    PICTURE,
+    find_session,
+    name_of,
+    person_lock,
+    recently_opened,
+    run_at,
+)
+from .openai_request import ChatRequest, Message, Place, data_of, digest
 from .sessions import check_room, checked_picture
 from .tokens import Person
 
@@ -38,6 +45,10 @@ BEAT, DRIVING = 5.0, 20.0
 NEEDED = (
     "I need a picture of the place, and what the robots should do there: attach one picture, and "
     "say for example *Surround the largest coin with 6 robots*."
+)
+WHAT_TO_DO = (
+    "I have the picture. What should the robots do there? Say for example *Surround the largest "
+    "coin with 6 robots*."
 )
 EMPTY = "Say what to do, such as *a bit further out*, *undo* or *go*."
 BUSY = (
@@ -57,7 +68,6 @@ BROKEN_OFF = (
 NOTHING_MOVES = (
     "No robots of this chat are moving. Real robots of this server are held, whoever drove them."
 )
-DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 UNSAFE = re.compile(r"\](?=[(\[:])|<(?=[a-z/!?])", re.I)
 """Characters to escape, so that text a model read in a picture is no link, picture or HTML."""
 
@@ -156,7 +166,7 @@ async def begin(hub: Hub, person: Person, request: ChatRequest, base: str) -> An
         return Answer(answer)
     if request.place is not None and not request.since:  # no new message since our answer
         check_owner(request.place.session, person)
-        return await answer_of(request.place, await run_at(hub, request.place), base)
+        return await answer_at(hub, request.place, base)
     _check(request.last)
     if (held := await _hold(hub, person, request, base)) is not None:
         return held
@@ -170,7 +180,7 @@ async def begin(hub: Hub, person: Person, request: ChatRequest, base: str) -> An
     try:
         turn = await _turn(hub, person, request, session, key)
         if turn is None:
-            return _text_answer(EMPTY, base, request.place)
+            return await _nothing_said(hub, session, request, base)
         await turn.begin()
         return Begun(base, session, turn)
     except InputError as error:
@@ -188,8 +198,7 @@ async def _fallback_answer(
         InputError: the error itself, if it is none of these.
     """
     if error.kind == "repeated":
-        place = Place(session, error.facts["turn"])
-        return await answer_of(place, await run_at(hub, place), base)
+        return await answer_at(hub, Place(session, error.facts["turn"]), base)
     if error.kind in ("not_allowed", "asked"):
         return _text_answer(str(error), base, request.place)
     if error.kind != "busy":
@@ -197,6 +206,17 @@ async def _fallback_answer(
     now = hub.service.turn(session)
     place = Place(session, now.number) if now and now.number else request.place
     return _text_answer(DRIVES if now and now.moving.is_set() else BUSY, base, place)
+
+
+async def answer_at(hub: Hub, place: Place, base: str) -> Answer:
+    """Return the answer that was given at a place.
+
+    Raises:
+        InputError: there is no such turn (`missing`).
+    """
+    if place.turn == OPENED:
+        return _text_answer(WHAT_TO_DO, base, place)
+    return await answer_of(place, await run_at(hub, place), base)
 
 
 async def answer_of(place: Place, run: Run, base: str) -> Answer:
@@ -232,7 +252,7 @@ async def _turn(
     if held.run is None and not words:  # the words came in a message before the picture
         words = next((m.text for m in reversed(request.users) if m.text), "")
     for address in request.last.pictures:
-        data = _data(address)
+        data = data_of(address)
         if hashlib.sha256(data).hexdigest() != held.picture.sha256:
             picture = await asyncio.to_thread(checked_picture, data, "picture", hub)
             turn = hub.service.image(session, picture, asked_by(person, key and key + PICTURE))
@@ -247,21 +267,28 @@ async def _turn(
     return turn
 
 
+async def _nothing_said(hub: Hub, session: str, request: ChatRequest, base: str) -> Answer:
+    """Return the answer to a message without words or another picture: what can be said."""
+    if (await hub.service.fresh(session)).run is None:
+        return _text_answer(WHAT_TO_DO, base, Place(session, OPENED))
+    return _text_answer(EMPTY, base, request.place)
+
+
 async def _open_session(hub: Hub, person: Person, request: ChatRequest) -> tuple[str, str] | None:
     """Open a session, unless the same message has just opened one.
 
     Returns:
-        The session's id and the key of the turn; None if the messages lack a picture or words.
+        The session's id and the key of the turn; None if the messages have no picture.
     """
     pictured = [m for m in request.users if m.pictures]
-    if not pictured or not any(m.text for m in request.users):
+    if not pictured:
         return None
     key = digest(request.who, *request.users)
-    if (before := await recently_opened(hub, person, key)) is not None:
+    if (before := await recently_opened(hub, person, request, key)) is not None:
         return before, key
     await asyncio.to_thread(check_room, hub, person)
     _check(pictured[-1])
-    data = _data(pictured[-1].pictures[0])
+    data = data_of(pictured[-1].pictures[0])
     made = hub.service.open(
         await asyncio.to_thread(checked_picture, data, "picture", hub),
         settings=hub.settings.of_session(),
@@ -288,27 +315,6 @@ async def _hold(hub: Hub, person: Person, request: ChatRequest, base: str) -> An
     if found is None or run is None:
         return _text_answer(NOTHING_MOVES, base, request.place)
     return await answer_of(Place(found[0], hub.service.last_turn(found[0])), run, base)
-
-
-def _data(address: str) -> bytes:
-    """Decode the data URL of a picture; nothing is ever fetched.
-
-    Raises:
-        InputError: the address is not a data URL of a picture.
-    """
-    head = DATA.match(address)
-    if head is None:
-        shown = address[:60] or "a file's id"
-        raise InputError(
-            f"The picture is given as {shown!r}, but this server fetches nothing; attach the file "
-            "itself, as a data URL (data:image/png;base64,...)."
-        )
-    try:
-        return base64.b64decode(address[head.end() :], validate=True)
-    except ValueError:
-        raise InputError(
-            "The picture's data URL is not valid base64; attach the picture again."
-        ) from None
 
 
 def _check(message: Message) -> None:

@@ -5,6 +5,8 @@ end continues in a fork. Any process finds all of this again in the store.
 """
 
 import asyncio
+import hashlib
+import re
 from collections.abc import AsyncGenerator, Sequence
 from contextlib import asynccontextmanager, suppress
 from datetime import UTC, datetime, timedelta
@@ -15,7 +17,7 @@ from ...agent.store.protocol import Event, StoredSession, files_named
 from ...tools.errors import InputError, StorageError
 from .forms import SessionFacts
 from .hub import Hub, check_owner
-from .openai_request import ChatRequest, Message, Place, digest
+from .openai_request import ChatRequest, Message, Place, data_of, digest
 from .sessions import check_room, owned
 from .tokens import Person
 
@@ -25,6 +27,10 @@ PICTURE = ".picture"
 """The suffix of the key of a turn that only sets the picture for the next one."""
 MARK = 12
 """Digits of a digest in a session's name, by which the session is found again."""
+CHAT_MARK = re.compile(rf"\[[0-9a-f]{{{MARK}}}\] (\[[0-9a-f]{{{MARK}}}\])$")
+"""Finds, in a session's name, the mark of the chat that the session belongs to."""
+OPENED = 1
+"""The number of the event that opens a session; as a turn, the place before the first turn."""
 
 
 @asynccontextmanager
@@ -52,11 +58,13 @@ async def find_session(
         return None
     events = await _events(hub, check_owner(place.session, person))
     key = None if len(request.users) == 1 else digest(request.who, *request.users)
+    if _begins_anew(request, events if place.turn == 0 else _until(events, place.turn)):
+        return None
     if place.turn == 0:
         return place.session, key
     if request.place is not None:
         for message in request.since[:-1]:  # messages whose answers the client lost
-            place, events = await _follow_up(hub, person, place, message, events)
+            place, events = await _follow_up(hub, person, request, place, message, events)
         key = _key(place, request.last)
     assert key is not None, "a history that is remembered has more than one message"
     return place.session if here else await _in_session(
@@ -68,16 +76,14 @@ def name_of(request: ChatRequest, key: str) -> str:
     """Return the name of a session, with marks by which it is found again."""
     words = next((m.text for m in request.users if m.text), "")
     line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
-    return " ".join(
-        [line[:60], f"[{key[:MARK]}]", *([_chat_mark(request)] if request.chat else [])]
-    )
+    return " ".join(filter(None, [line[:60], f"[{key[:MARK]}]", _chat_mark(request)]))
 
 
-async def recently_opened(hub: Hub, person: Person, key: str) -> str | None:
-    """Return the session that the same first message opened within `SAME`, or None."""
+async def recently_opened(hub: Hub, person: Person, request: ChatRequest, key: str) -> str | None:
+    """Return the session that the same first message of the chat opened within `SAME`, or None."""
     found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
     since = (datetime.now(UTC) - SAME).isoformat()
-    return next((facts.id for facts in found if facts.created >= since), None)
+    return next((f.id for f in _of_chat(found, request) if f.created >= since), None)
 
 
 async def run_at(hub: Hub, place: Place) -> Run:
@@ -97,28 +103,44 @@ async def run_at(hub: Hub, place: Place) -> Run:
 
 
 async def _remembered(hub: Hub, person: Person, request: ChatRequest) -> Place | None:
-    """Return the place where a history without our messages goes on; turn 0 for a session's end."""
+    """Return the place where a history without our messages goes on; turn 0 for a session's end.
+
+    Sessions of the request's own chat come first, then those in which most of it was said.
+    """
     keys = [digest(request.who, *request.users[:n]) for n in range(len(request.users) - 1, 0, -1)]
-    marks = [f"[{key[:MARK]}]" for key in keys]
-    chat = _chat_mark(request) if request.chat else None
-    listed = await asyncio.to_thread(_marked, hub, person, *marks, *([chat] if chat else []))
-    for facts in listed:
-        turns = _turns(await _events(hub, facts.id))
-        if number := next((turns[key] for key in keys if key in turns), None):
-            return Place(facts.id, number)
+    marks = [f"[{key[:MARK]}]" for key in keys] + ([_chat_mark(request)] if request.chat else [])
+    listed = await asyncio.to_thread(_marked, hub, person, *marks)
+    own = _of_chat(listed, request)
+    turns = {facts.id: _turns(await _events(hub, facts.id)) for facts in own or listed}
+    for key in keys:
+        for session, numbers in turns.items():
+            if key in numbers:
+                return Place(session, numbers[key])
     if request.last.pictures and not keys:
         return None  # another chat may begin with the same message
-    return next((Place(f.id, 0) for f in listed if chat and chat in f.name), None)
+    return Place(own[0].id, 0) if own and request.chat else None
+
+
+def _begins_anew(request: ChatRequest, events: Sequence[Event]) -> bool:
+    """Return whether a request brings another picture to a session where nothing was said yet."""
+    if any(e.kind in STAMPED for e in events):
+        return False
+    sent = [hashlib.sha256(data_of(address)).hexdigest() for address in request.last.pictures]
+    return bool(sent) and events[0].data["picture"]["facts"]["sha256"] not in sent
 
 
 async def _in_session(
     hub: Hub, person: Person, request: ChatRequest, place: Place, key: str, events: Sequence[Event]
 ) -> str:
-    """Return a session in which nothing but this request follows the turn, forking if need be."""
+    """Return a session in which nothing but this request follows the turn, forking if need be.
+
+    It is of the request's own chat.
+    """
     later = [e for e in events[place.turn :] if e.kind in STAMPED]
-    if not later or later[0].data.get("key") in (key, key + PICTURE):
+    followed = bool(later) and later[0].data.get("key") not in (key, key + PICTURE)
+    if not followed and not await _is_of_another(hub, person, request, place.session):
         return place.session
-    if (fork := await _fork_for(hub, person, key)) is not None:
+    if (fork := await _fork_for(hub, person, request, key)) is not None:
         return fork
     await asyncio.to_thread(check_room, hub, person)
     kept, store = _until(events, place.turn), hub.service.store
@@ -127,20 +149,34 @@ async def _in_session(
 
 
 async def _follow_up(
-    hub: Hub, person: Person, place: Place, message: Message, events: Sequence[Event]
+    hub: Hub,
+    person: Person,
+    request: ChatRequest,
+    place: Place,
+    message: Message,
+    events: Sequence[Event],
 ) -> tuple[Place, Sequence[Event]]:
     """Return the place of the turn that a message began, and its events; if none, those given."""
     key = _key(place, message)
-    fork = None if key in _turns(events) else await _fork_for(hub, person, key)
+    fork = None if key in _turns(events) else await _fork_for(hub, person, request, key)
     there = events if fork is None else await _events(hub, fork)
     turn = _turns(there).get(key)
     return (place, events) if turn is None else (Place(fork or place.session, turn), there)
 
 
-async def _fork_for(hub: Hub, person: Person, key: str) -> str | None:
-    """Return the session that was made for a message, or None."""
+async def _fork_for(hub: Hub, person: Person, request: ChatRequest, key: str) -> str | None:
+    """Return the session of the chat that was made for a message, or None."""
     found = await asyncio.to_thread(_marked, hub, person, f"[{key[:MARK]}]")
-    return found[0].id if found else None
+    return next((facts.id for facts in _of_chat(found, request)), None)
+
+
+async def _is_of_another(hub: Hub, person: Person, request: ChatRequest, session: str) -> bool:
+    """Return whether a session belongs to another chat than the one that the request names."""
+    if not request.chat:
+        return False
+    listed = await asyncio.to_thread(owned, hub, person)
+    chats = {facts.id: _chat_of(facts) for facts in listed}
+    return chats.get(session, "") not in ("", _chat_mark(request))
 
 
 def _until(events: Sequence[Event], turn: int) -> tuple[Event, ...]:
@@ -169,8 +205,21 @@ def _marked(hub: Hub, person: Person, *marks: str) -> list[SessionFacts]:
     return [facts for facts in found if any(mark in facts.name for mark in marks)]
 
 
+def _of_chat(found: Sequence[SessionFacts], request: ChatRequest) -> list[SessionFacts]:
+    """Return the sessions that belong to the request's chat, or to none if it names none."""
+    return [facts for facts in found if _chat_of(facts) == _chat_mark(request)]
+
+
+def _chat_of(facts: SessionFacts) -> str:
+    """Return the mark of the chat that a session belongs to; empty for none."""
+    found = CHAT_MARK.search(facts.name)
+    return found[1] if found else ""
+
+
 def _chat_mark(request: ChatRequest) -> str:
-    return f"[{digest('chat', request.who, request.chat)[:MARK]}]"
+    """Return the mark of the chat that a request names; empty for none."""
+    chat = digest("chat", request.who, request.chat)
+    return f"[{chat[:MARK]}]" if request.chat else ""
 
 
 def _key(place: Place, message: Message) -> str:

@@ -4,6 +4,7 @@ The person's last message is carried out; the rest of the history only shows whe
 Messages of systems, tools and assistants are never obeyed.
 """
 
+import base64
 import hashlib
 import re
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ from ...tools.errors import InputError
 
 OURS = re.compile(r"/v1/pictures/([a-z0-9_-]+)/(\d+)")
 """Finds the session and turn in the address that each of our messages ends with."""
+DATA = re.compile(r"data:image/[\w.+-]+;base64,", re.I)
 RESPONSE = re.compile(r"resp_(?:none_[0-9a-f]+|([a-z0-9_-]+)_(\d+))")
 
 
@@ -188,6 +190,27 @@ def place_of(response: str) -> Place | None:
     if found is None:
         raise InputError(f"There is no response {response[:80]!r}.", "missing")
     return None if found[1] is None else Place(found[1], int(found[2]))
+
+
+def data_of(address: str) -> bytes:
+    """Return the bytes of a picture's data URL; nothing is ever fetched.
+
+    Raises:
+        InputError: the address is not a data URL of a picture.
+    """
+    head = DATA.match(address)
+    if head is None:
+        shown = address[:60] or "a file's id"
+        raise InputError(
+            f"The picture is given as {shown!r}, but this server fetches nothing; attach the file "
+            "itself, as a data URL (data:image/png;base64,...)."
+        )
+    try:
+        return base64.b64decode(address[head.end() :], validate=True)
+    except ValueError:
+        raise InputError(
+            "The picture's data URL is not valid base64; attach the picture again."
+        ) from None
 
 
 def digest(*parts: object) -> str:

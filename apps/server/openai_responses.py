@@ -10,9 +10,8 @@ from fastapi.responses import JSONResponse, StreamingResponse
 
 from ...tools.errors import InputError
 from .hub import AHub, APerson, check_owner
-from .openai_answers import USUAL, Answer, Begun, answer_of, base_of, begin, final_answer, problem
+from .openai_answers import USUAL, Answer, Begun, answer_at, base_of, begin, final_answer, problem
 from .openai_chat import STREAM, frame
-from .openai_places import run_at
 from .openai_request import ResponsesBody, parse_request, place_of
 from .sessions import ERRORS
 
@@ -40,7 +39,7 @@ async def again(response: str, request: Request, hub: AHub, person: APerson) -> 
     if place is None:
         raise InputError(f"The response {response!r} was not kept.", "missing")
     check_owner(place.session, person)
-    answer = await answer_of(place, await run_at(hub, place), base_of(request, hub))
+    answer = await answer_at(hub, place, base_of(request, hub))
     return JSONResponse(_completed(answer, _response(answer, USUAL)))
 
 

@@ -113,7 +113,7 @@ async def begin(
             picture, settings=settings, name=name, agent=agent, owner=person.name
         )
     )
-    return await state_of(hub, made)
+    return await state_of(hub, made, person)
 
 
 def check_room(hub: Hub, person: Person) -> None:
@@ -153,11 +153,11 @@ async def listed(
 @router.get("/sessions/{session}")
 async def state(session: str, hub: AHub, person: APerson) -> SessionState:
     """Get the current state of a session."""
-    return await state_of(hub, await check_seen(hub, session, person))
+    return await state_of(hub, await check_seen(hub, session, person), person)
 
 
-async def state_of(hub: Hub, session: str) -> SessionState:
-    """Return the current state of a session, as clients get it.
+async def state_of(hub: Hub, session: str, person: Person) -> SessionState:
+    """Return the current state of a session, as the person who asks gets it.
 
     Raises:
         InputError: there is no such session.
@@ -170,6 +170,7 @@ async def state_of(hub: Hub, session: str) -> SessionState:
     return SessionState(
         id=session,
         agent=held.agent.model.name,
+        scope=person.scope,
         events=held.begun if run is None else run.events or 0,
         under_way=now,
         last=run and run.report,
@@ -185,7 +186,7 @@ async def rename(session: str, to: Name, hub: AHub, person: APerson) -> SessionS
     require_scope(person, "plan")
     mine = check_owner(session, person)
     await asyncio.to_thread(hub.service.store.rename, mine, to.name)
-    return await state_of(hub, session)
+    return await state_of(hub, session, person)
 
 
 @router.delete("/sessions/{session}", status_code=204)
@@ -201,7 +202,8 @@ async def fork(session: str, at: Fork, hub: AHub, person: APerson) -> SessionSta
     require_scope(person, "plan")
     await asyncio.to_thread(check_room, hub, person)
     mine = check_owner(session, person)
-    return await state_of(hub, await asyncio.to_thread(hub.service.fork, mine, at.turn))
+    made = await asyncio.to_thread(hub.service.fork, mine, at.turn)
+    return await state_of(hub, made, person)
 
 
 @router.get("/sessions/{session}/plans/{plan_id}")

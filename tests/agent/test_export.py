@@ -2,12 +2,14 @@
 
 import json
 import re
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.export import export_folder, export_json, export_page
 from formup.agent.messages import Call, Reply
+from formup.agent.service import Service
 from formup.agent.session import Run, load_run
 from formup.agent.store.places import store_at
 from formup.agent.wrappers.doubles import ScriptedModel
@@ -55,6 +57,18 @@ def test_a_page_says_what_was_asked_and_shows_each_plan(said: Run, tmp_path: Pat
     sizes = [load_picture(tmp_path / "page" / name).pixels.shape[:2] for name in shown]
     assert sizes[0] == (140, 200)
     assert min(sizes[1]) > 200
+
+
+def test_a_session_in_which_nothing_was_said_is_its_picture(
+    red_box: Picture, tmp_path: Path
+) -> None:
+    with closing(store_at(tmp_path / "sessions")) as store:
+        session = store.open(Service(Agent(), store).open(red_box))
+        page = export_page(session, tmp_path / "page").read_text()
+        assert export_json(session, tmp_path / "page").is_file()
+    assert page == (
+        f"# Session {session.id}\n\n200 x 140 px, offline\n\n![start](pictures/start.png)\n"
+    )
 
 
 def test_a_folder_is_a_run_that_trace_reads_and_others_go_on_with(

@@ -203,7 +203,9 @@ def test_the_picture_is_beside_the_log_and_is_given_again_where_it_is_not(tmp_pa
     kept = load_run(tmp_path / "t.jsonl").context.picture
     assert (kept.pixels == pixels).all()
     shutil.rmtree(tmp_path / "pictures")
-    with pytest.raises(InputError, match=r"neither beside the log nor where it lay.*--image"):
+    with pytest.raises(
+        InputError, match=r"neither beside the log nor where it lay.*give it as the image"
+    ):
         load_run(tmp_path / "t.jsonl")
     assert load_run(tmp_path / "t.jsonl", picture_from_array(pixels)).report.status == "answered"
     other = picture_from_array(np.zeros((60, 80, 3), np.uint8))

@@ -208,7 +208,7 @@ def test_unusable_plan_files(cli: Cli, picture: Path, tmp_path: Path) -> None:
     shutil.rmtree(tmp_path / "o/pictures")
     refused(cli("deploy", "o/plan.json"), "changed")
     picture.unlink()
-    refused(cli("deploy", "o/plan.json"), "not beside it", "--image")
+    refused(cli("deploy", "o/plan.json"), "not beside it", "give it as the image")
 
 
 def test_tools_by_hand_say_what_is_wrong(cli: Cli, picture: Path) -> None:

@@ -289,7 +289,7 @@ def test_a_changed_picture_is_refused_and_the_old_one_can_be_named(
         refused(cli(*command), "scene.png", "changed")
     picture.unlink()
     for command in (("resume", "out", "--approve"), ("deploy", "out/plan.json")):
-        refused(cli(*command), "--image")
+        refused(cli(*command), "give it as the image")
     deployed = report(cli("deploy", "out/plan.json", "--image", kept, "--json"))
     assert deployed["status"] == "deployed"
     done = report(cli("resume", "out", "--approve", "--image", kept, "--json"))

@@ -261,7 +261,7 @@ def test_the_picture_is_found_beside_the_file_or_where_it_lay_or_is_named(
     path, beside = moved / path.name, moved / "pictures" / beside.name
     assert picture_of(stored, path).path == beside
     beside.unlink()
-    with pytest.raises(ImageError, match=r"no longer at .*photo\.jpg; name it with --image"):
+    with pytest.raises(ImageError, match=r"no longer at .*photo\.jpg; give it as the image"):
         picture_of(stored, path)
     assert picture_of(stored, path, load_picture(PHOTO)).path == PHOTO
 
@@ -275,7 +275,7 @@ def test_another_picture_is_refused(world: World, tmp_path: Path) -> None:
         with pytest.raises(InputError, match="not the picture this was made for"):
             picture_of(stored, path, given)
     nowhere = StoredWorld(world=world)
-    with pytest.raises(ImageError, match="is not beside it; name it with --image"):
+    with pytest.raises(ImageError, match="is not beside it; give it as the image"):
         picture_of(nowhere, path)
 
 

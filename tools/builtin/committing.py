@@ -261,7 +261,7 @@ def _check_may_move(context: Context, plan: Plan) -> None:
         short = plan.partial.short(context.world.metres_per_pixel)
         raise ToolError(
             f"Plan {plan.id} is partial ({short}): nothing of a task is done unasked. A person "
-            "may have exactly this plan driven, with formup deploy."
+            "may have exactly this plan driven, by its id."
         )
     if not context.settings.may_deploy:
         raise ToolError("The person asked for the plan only: nothing may be moved.")

@@ -114,7 +114,7 @@ def _found_by_text(
     if context.finder is None:
         raise ToolError(
             "Nothing that is set finds things by text: point with an outline, a box or points, or "
-            "the person may choose another --detector or --segmenter."
+            "the person may choose another detector or segmenter."
         )
     context = context.looking_for([text])
     phrase = noun_phrase(text)

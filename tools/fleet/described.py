@@ -61,7 +61,9 @@ def fleet_named(name: str) -> FleetFactory:
     path = Path(name)
     if path.suffix.lower() not in SUFFIXES:
         if name in KINDS:
-            raise InputError(f"The fleet {name!r} is described by a file: --fleet FILE.yaml.")
+            raise InputError(
+                f"The fleet {name!r} is described by a file; give FILE.yaml as the fleet."
+            )
         return FLEETS.load(name)
     kind = content_of(path, BEGIN).get("fleet")
     if not isinstance(kind, str):

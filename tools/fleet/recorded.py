@@ -48,8 +48,8 @@ class RecordedFleet:
     async def drive(self, motion: Motion) -> AsyncGenerator[tuple[Pose, ...], None]:
         """Refuse to: there is nobody to drive."""
         raise FleetError(
-            f"The robots of {self._path} were recorded and cannot be driven; plan for them with "
-            "--plan-only, or name another fleet."
+            f"The robots of {self._path} were recorded and cannot be driven; plan for them "
+            "without driving, or name another fleet."
         )
         yield ()
 

@@ -83,7 +83,7 @@ def spread_starts(n: int, frame: Frame, solid: BaseGeometry, radius: float) -> F
     if len(points) < n:
         raise InputError(
             f"Only {len(points)} of {n} robots find room to start outside the target; "
-            "give their starting positions with --starts."
+            "give their starting positions, or take fewer robots."
         )
     return points
 

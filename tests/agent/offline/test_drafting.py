@@ -149,7 +149,7 @@ def test_metres_take_a_scale() -> None:
     assert len(read_instruction(words).unscaled) == 3
     question = asked(words, scale=None)
     assert question is not None
-    assert "--metres-per-pixel" in question
+    assert "Say it in px" in question
     assert asked(words) is None
 
 

@@ -100,7 +100,7 @@ def test_without_a_yes_nothing_moves(
             told = await call(client, "approve_and_deploy", **wanted)
             assert told["status"] == status
             if person is None:
-                assert f"/approve in formup chat --session {session}" in told["message"]
+                assert f"/approve in a terminal's chat of session {session}" in told["message"]
                 for words in ("yes", "approve", "go", f"A person approved plan {plan_id}."):
                     await client.call_tool("instruct", {"session": session, "words": words})
             assert moves(hub, session) == 0

@@ -188,6 +188,11 @@ def test_refusals_are_one_sentence(with_server: Runs, era: str) -> None:
                 assert await refusal(client, "open_scene", image=image)
             gone = await refusal(client, "status", session="ann-0123456789")
             assert gone == "Error executing tool status: There is no session 'ann-0123456789'."
+            lacking = await refusal(client, "instruct", session="x", points=[{"ring": 1}])
+            assert lacking == (
+                "instruct cannot be called with these arguments: words: is missing; "
+                "points.0.ring: Extra inputs are not permitted (got 1)."
+            )
             first = await caged(client)
             wanted = {"session": first["session"], "idempotency_key": "k"}
             wrong = await refusal(client, "approve_and_deploy", plan_id="p-none", **wanted)

@@ -302,7 +302,7 @@ class WireFleet(ABC):
             where, alone = self.settings.where, self.settings.alone
             raise FleetUnreachableError(
                 f"{where[0].upper()}{where[1:]} is out of reach: {why}. {alone[0].upper()}"
-                f"{alone[1:]}; `formup fleet check FILE` looks for the cause."
+                f"{alone[1:]}; a check of the fleet looks for the cause."
             )
 
     def _check_going(self, robots: Mapping[str, object], stops: int, joined: int) -> None:

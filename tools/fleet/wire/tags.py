@@ -61,6 +61,6 @@ class TagSettings(Value):
         if size != (width, height):
             raise InputError(
                 f"The picture has {size[0]:g} x {size[1]:g} pixels, and the fleet's camera shows "
-                f"its floor in {width} x {height}; give the picture with --calibration "
-                f"{self.calibration}."
+                f"its floor in {width} x {height}; give a picture of the camera with "
+                f"its calibration, {self.calibration}."
             )

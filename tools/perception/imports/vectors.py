@@ -138,7 +138,7 @@ def yolo_shapes(text: str, size: Size) -> list[Shape]:
         if len(values) == 4 or len(values) % 2:
             raise refusal(
                 f"a line in it has {len(values)} numbers behind the class, as a box has",
-                "give polygons of 3 or more x, y from 0 to 1, or point with --box",
+                "give polygons of 3 or more x, y from 0 to 1, or point with a box",
             )
         ring: FloatArray = ring_of(values)
         if ring.min() < 0 or ring.max() > 1:

@@ -116,11 +116,30 @@ def test_the_clients_helper_takes_the_stream(serve: Serve, sent: Any, client: An
 def test_what_is_missing_is_asked_for_without_a_turn(serve: Serve, chat: Any, store: Store) -> None:
     url = serve()
     talk, other = chat(url), chat(url)
-    assert "picture of the place" in talk.say("", "us_coins.jpg")
     assert "picture of the place" in other.say(CAGE)
     assert store.sessions() == ()
+    asked = talk.say("", "us_coins.jpg")
+    assert "I have the picture. What should the robots do there?" in asked
+    for kept in (talk.messages[:1], talk.messages):
+        assert chat(url, messages=kept).again() == asked, "sent again, it is asked again"
+    assert said_in(store) == []
+    edited = chat(url, messages=talk.messages)
     assert "10 robots have certified" in talk.say(CAGE), "the picture came before the words"
     assert "10 robots have certified" in other.say("", "us_coins.jpg"), "or after them"
+    assert "9 robots have certified" in edited.say(CAGE.replace("10", "9"))
+    assert [s.turns for s in store.sessions()] == [1, 1, 1]
+
+
+def test_a_picture_alone_is_kept_for_the_next_message(
+    serve: Serve, chat: Any, store: Store
+) -> None:
+    """The client names its chat, and sends nothing but the last message."""
+    talk, named = chat(serve()), {"metadata": {"chat_id": "chat-7"}}
+    for words, picture in (("", "cars_two.jpg"), ("", "us_coins.jpg"), (CAGE, None)):
+        talk.messages.clear()
+        answer = talk.say(words, picture, **named)
+    assert "10 robots have certified" in answer, "on the last picture"
+    assert [s.turns for s in store.sessions()] == [1, 0]
 
 
 def test_a_picture_with_later_words_is_another_picture(

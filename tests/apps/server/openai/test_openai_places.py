@@ -159,6 +159,67 @@ def test_a_client_may_name_its_chat(serve: Serve, chat: Any, store: Store, how: 
         )
 
 
+@pytest.mark.parametrize("keeps", ["nothing", "words", "all"])
+def test_chats_that_begin_alike_stay_apart(
+    serve: Serve, chat: Any, store: Store, keeps: str
+) -> None:
+    """One token and one first message, from clients that keep different parts of a history."""
+
+    def say(talk: Any, name: str, words: str, picture: str | None = None) -> str:
+        if keeps == "nothing":
+            talk.messages.clear()
+        for message in talk.messages if keeps == "words" else ():
+            if message["role"] == "assistant":
+                message["content"] = OURS.sub("", message["content"])
+        named = {"metadata": {"chat_id": name}} if name else {}
+        return session_of(talk.say(words, picture, **named))
+
+    url = serve()
+    talks = {name: chat(url) for name in ("one", "two", "")}
+    found = {name: say(talk, name, CAGE, "us_coins.jpg") for name, talk in talks.items()}
+    assert len({*found.values()}) == 3
+    if keeps == "nothing":
+        del talks[""]  # it needs a name, or a history
+    said = {name: [CAGE] for name in found}
+    for words in ("a bit further out", "undo"):
+        for name, talk in talks.items():
+            assert say(talk, name, words) == found[name]
+            said[name].append(words)
+    assert turns(store) == {found[name]: words for name, words in said.items()}
+
+
+def test_an_edited_message_forks_from_what_was_said_longest(
+    serve: Serve, chat: Any, store: Store
+) -> None:
+    """A chat with a name and a history without addresses goes on where it was, not in a fork."""
+    talk, named = chat(serve()), {"metadata": {"chat_id": "chat-7"}}
+    session = session_of(talk.say(CAGE, "us_coins.jpg", **named))
+    talk.messages = [m for m in talk.messages if m["role"] == "user"]
+    talk.say("a bit further out", **named)
+    talk.messages = [m for m in talk.messages if m["role"] == "user"]
+    edited = chat(str(talk.client.base_url).removesuffix("/v1/"), messages=talk.messages[:1])
+    assert session_of(edited.say("a bit closer", **named)) != session
+    assert session_of(talk.say("undo", **named)) == session
+    assert sorted(turns(store).values()) == [
+        [CAGE, "a bit closer"],
+        [CAGE, "a bit further out", "undo"],
+    ]
+
+
+def test_a_chat_copied_under_another_name_goes_on_in_a_session_of_its_own(
+    serve: Serve, chat: Any, store: Store
+) -> None:
+    talk = chat(url := serve())
+    first = session_of(talk.say(CAGE, "us_coins.jpg", metadata={"chat_id": "one"}))
+    copied = chat(url, messages=talk.messages)
+    second = session_of(copied.say("a bit closer", metadata={"chat_id": "two"}))
+    assert session_of(talk.say("a bit closer", metadata={"chat_id": "one"})) == first != second
+    for name, session in (("one", first), ("two", second)):
+        alone = chat(url).say("undo", metadata={"chat_id": name})
+        assert session_of(alone) == session
+    assert turns(store) == {s: [CAGE, "a bit closer", "undo"] for s in (first, second)}
+
+
 def test_a_session_that_was_deleted_is_told(serve: Serve, chat: Any, store: Store) -> None:
     talk = chat(serve())
     session = session_of(talk.say(CAGE, "us_coins.jpg"))

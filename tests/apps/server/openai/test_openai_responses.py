@@ -101,6 +101,18 @@ def test_a_failure_ends_the_stream_as_one(serve: Serve, client: Any, caged: list
     assert "secret" not in "".join(lines)
 
 
+def test_a_picture_alone_is_kept_for_the_next_response(
+    serve: Serve, client: Any, caged: list[Any]
+) -> None:
+    openai = client(serve())
+    alone = [{**caged[0], "content": [p for p in caged[0]["content"] if p["type"] != "input_text"]}]
+    asks = checked(openai.responses.create(model="formup", input=alone))
+    assert "I have the picture" in asks.output_text
+    assert checked(openai.responses.retrieve(asks.id)).output_text == asks.output_text
+    caging = openai.responses.create(model="formup", input=CAGE, previous_response_id=asks.id)
+    assert "10 robots have certified" in checked(caging).output_text
+
+
 def test_what_is_not_there_is_told(serve: Serve, client: Any, caged: list[Any]) -> None:
     openai = client(serve())
     asks = checked(openai.responses.create(model="formup", input="Hello"))

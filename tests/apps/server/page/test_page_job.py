@@ -51,7 +51,7 @@ def test_a_picture_of_ones_own_to_a_team_that_moved(server: Any, visit: Any) -> 
 
     page.click("#go")
     expect(page.locator("#approval-text")).to_contain_text(f"Plan {moved}: 8 robots")
-    expect(page.locator("#approval-text")).to_contain_text("The longest way is")
+    expect(page.locator("#approval-text")).to_contain_text("The longest path is")
     page.click("#approve")
     expect(page.locator("#log > li[data-status=deployed]")).to_have_count(1, timeout=LONG)
     expect(page.locator("#certificate")).to_contain_text("All robots were seen at their places")
@@ -273,10 +273,34 @@ def test_tokens_are_asked_for(serve: Any, visit: Any, tmp_path: Path, scheme: st
     here = visit(serve(tokens=file).url, color_scheme=scheme)
     here.page.goto(here.url)
     expect(here.page.locator("#sign-in")).to_be_visible(timeout=LONG)
+    refused = here.page.locator("#not-accepted")
+    expect(refused).to_be_hidden()
+    here.page.fill("#token", token[:-1])
+    here.page.keyboard.press("Enter")
+    expect(refused).to_contain_text("This token was not accepted", timeout=LONG)
     here.page.fill("#token", token)
     here.page.keyboard.press("Enter")
     here.page.locator("#examples button").first.click(timeout=LONG)
     expect(here.page.locator("#scene image")).to_be_attached(timeout=LONG)
+
+
+def test_a_token_that_may_not_move_is_offered_no_move(
+    serve: Any, visit: Any, tmp_path: Path
+) -> None:
+    from formup.apps.server.tokens import Tokens
+
+    file = tmp_path / "tokens.json"
+    token = Tokens(file).add("pat", "plan")
+    here = visit(serve(tokens=file).url)
+    here.page.goto(here.url)
+    here.page.fill("#token", token)
+    here.page.keyboard.press("Enter")
+    here.page.locator("#examples button").first.click(timeout=LONG)
+    expect(here.page.locator("#scene image")).to_be_attached(timeout=LONG)
+    here.say("Surround the largest coin")
+    told = "Your token has the scope plan; moving the robots needs move."
+    expect(here.page.locator("#may-not")).to_have_text(told, timeout=LONG)
+    expect(here.page.locator("#go")).to_be_hidden()
 
 
 def test_a_shared_link_shows_what_happens_and_lets_nothing_be_done(server: Any, visit: Any) -> None:

@@ -81,7 +81,7 @@ def test_a_mistake_is_found_before_a_broker_is_looked_for(
 
 
 def test_a_name_alone_and_a_file_of_another_fleet_do_not_do() -> None:
-    with pytest.raises(InputError, match=r"described by a file: --fleet FILE\.yaml"):
+    with pytest.raises(InputError, match=r"described by a file; give FILE\.yaml as the fleet"):
         fleet_named("mqtt")
     with pytest.raises(InputError, match="begin it with `fleet: mqtt`"):
         described_as(MqttSettings, ROOT / "examples/hamsters.yaml")
