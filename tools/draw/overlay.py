@@ -181,7 +181,7 @@ def _draw_robots(
     draw_idle_robots(canvas, idle_robots(world, plan), radius)
     node = world.plans.get(plan.id)
     for encounter in node.encounters if node is not None and near.all() else ():
-        for robot in encounter.robots if encounter.how != "over" else ():
+        for robot in encounter.robots if encounter.how in ("on", "border") else ():
             canvas.circle(shown[robot], 1.7 * radius, MET, max(0.3 * radius, 1.2))
     if near.all():
         draw_moves(canvas, moves_between(before, plan), radius)

@@ -1,11 +1,12 @@
 """Paths that also keep off the other things in a picture, as far as there is a way around them.
 
 A robot leaves what it starts or ends beside by the shortest way. What it starts or ends on does not
-count, and what would wall it off is driven over: less certain things before certain ones.
+count. What would wall it off is driven over: what is less certain first, then what the picture cuts
+off, whose end nobody sees; the picture is left rather than that other certain things are touched.
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString
 from shapely.geometry.base import BaseGeometry
 
-from ..formation.encounters import room_of
+from ..formation.encounters import AT_BORDER, room_of
 from ..formation.site import Other, Site
 from ..geometry.outline import FloatArray, distances
 from .routes import NOBODY, NoRouteError, routes
@@ -51,16 +52,16 @@ def routes_off(
     paths, frame = dict[int, FloatArray](), site.frame(radius)
     near = np.concatenate([starts, goals]) if ends is None else ends
 
-    def route(robots: Indices, things: Sequence[Other], share: float) -> Indices:
+    def route(robots: Indices, things: Sequence[Other], share: float, bounded: bool) -> Indices:
         """Find paths past things; return the robots that have none."""
         left = _with_room(things, share, site, near, radius)
         around, walled = solid, robots[:0]
         while len(robots):
             pair = starts[robots], goals[robots]
             try:
-                ways = routes(*pair, around, radius, frame, idle=idle, ends=near)
+                ways = routes(*pair, around, radius, frame, idle=idle, ends=near, bounded=bounded)
             except NoRouteError as error:
-                if around is solid:
+                if around is solid and not bounded:
                     raise
                 walled = np.concatenate([walled, robots[error.robots]])
                 robots = np.delete(robots, error.robots)
@@ -75,11 +76,22 @@ def routes_off(
         return walled
 
     for robots, things in _by_things_stood_on(starts, goals, site.others):
-        for off in (things, [thing for thing in things if thing.sure]):
-            for share in ROOM_SHARES:
-                robots = route(robots, off, share)
-        route(robots, (), 0.0)
+        for tried in _tries(things, site):
+            robots = route(robots, *tried) if len(robots) else robots
     return [paths[i] for i in range(len(starts))]
+
+
+def _tries(things: Sequence[Other], site: Site) -> Iterator[tuple[Sequence[Other], float, bool]]:
+    """Yield what is tried in turn: things to keep off, a share of room, whether to stay inside."""
+    sure = [thing for thing in things if thing.sure]
+    for off in (things, sure):
+        for share in ROOM_SHARES:
+            yield off, share, True
+    picture = site.frame(AT_BORDER).box
+    whole = [thing for thing in sure if picture.covers(thing.region)]
+    yield whole, 0.0, True
+    yield whole, 0.0, False
+    yield (), 0.0, False
 
 
 def _too_near(

@@ -17,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
 from ..formation.contract import MIN_SPACING, Contract
+from ..formation.encounters import ROOM_SHARE
 from ..formation.placement.place import Site
 from ..geometry.curves import Frame, round_join_dip
 from ..geometry.outline import FloatArray, distances
@@ -31,8 +32,8 @@ FEW = 12
 """A bend has so many segments per quarter circle around a corner, and keeps off it by this share
 more than it must. CLOSE is tried where nothing else leads through and bodies are at most FEW."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
-"""Shares of the smallest clearance at starts and goals that paths try to keep: well away where
-there is room, squeezing past where there is not."""
+"""Shares of the smallest clearance at starts and goals, but at most of the room kept from other
+things, that paths try to keep: away where there is room, squeezing past where there is not."""
 LEAST_EXIT = 1.0
 """How far robots that stand on an obstacle at least go off it, px."""
 ROUND_SEGMENTS = 16
@@ -80,11 +81,12 @@ def routes(
     *,
     idle: FloatArray = NOBODY,
     ends: FloatArray | None = None,
+    bounded: bool = False,
 ) -> list[FloatArray]:
     """Return shortest paths from start i to goal i, off obstacles and robots that do not move.
 
-    Paths leave the frame only where there is no other way. A robot that stands on an obstacle first
-    leaves it by the shortest way.
+    Paths leave the frame only where there is no other way, if at all. A robot that stands on an
+    obstacle first leaves it by the shortest way.
 
     Args:
         starts: (n, 2).
@@ -95,6 +97,7 @@ def routes(
         idle: (m, 2) where robots stand that do not move.
         ends: (k, 2) starts and goals of all calls in a row, so that all keep the same distance from
             obstacles.
+        bounded: whether a way that leaves the frame counts as none.
 
     Returns:
         n polylines, (k, 2) each.
@@ -104,7 +107,7 @@ def routes(
     """
     own = np.concatenate([starts, goals])
     ends = own if ends is None else ends
-    ground = _Ground(solid, radius, frame, ends)
+    ground = _Ground(solid, radius, frame, ends, bounded)
     wider = _bodies(idle, own, SPARE * radius)
     exits, entries = ground.exits(starts, goals, wider), ground.exits(goals, goals, wider)
     bodies = _bodies(idle, np.concatenate([own, exits, entries]), radius)
@@ -135,12 +138,15 @@ def way_lengths(
     """
     from scipy.spatial.distance import cdist
 
-    graph = _graph(solid.wkb, radius, None, BEND)
+    graph = _graph(solid.wkb, radius, frame, BEND)
     lengths = cdist(starts, goals)
     lines = np.stack(np.broadcast_arrays(starts[:, None], goals[None]), axis=2)
     bent = shapely.intersects(shapely.linestrings(lines), graph.barrier)
     if bent.any():
         lengths[bent] = graph.lengths(starts, goals)[bent]
+    if (shut := np.isinf(lengths)).any():
+        beyond = _graph(solid.wkb, radius, None, BEND)
+        lengths[shut] = beyond.lengths(starts, goals)[shut]
     return lengths
 
 
@@ -173,6 +179,7 @@ class _Ground:
     radius: float
     frame: Frame
     ends: FloatArray
+    bounded: bool = False
 
     def exits(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> FloatArray:
         """Return starts, (n, 2), those on obstacles moved off as far as the nearest goal is."""
@@ -230,9 +237,7 @@ class _Ground:
         paths = list(ways)
         for group, keeps in self._groups(starts, goals):
             left = group
-            tries = [(keep, self.frame, BEND) for keep in keeps] + [(keeps[-1], None, BEND)]
-            tries += [(keeps[-1], None, CLOSE)] if len(bodies) <= FEW else []
-            for keep, frame, bend in tries:
+            for keep, frame, bend in self._tries(keeps, len(bodies)):
                 if len(bodies):
                     graph = _graph_past(self.solid, keep, bodies, frame, bend)
                 else:
@@ -249,6 +254,13 @@ class _Ground:
                 raise self._no_route(left, goals, bodies)
         return paths
 
+    def _tries(self, keeps: Sequence[float], bodies: int) -> list[tuple[float, Frame | None, Bend]]:
+        """Return the distances to keep, px, frames and bends that are tried in turn."""
+        bends = [BEND, CLOSE] if bodies <= FEW else [BEND]
+        tries: list[tuple[float, Frame | None, Bend]] = [(k, self.frame, BEND) for k in keeps]
+        tries += [(keeps[-1], self.frame, bend) for bend in bends[1:]]
+        return tries + [(keeps[-1], None, bend) for bend in bends if not self.bounded]
+
     def _groups(self, starts: FloatArray, goals: FloatArray) -> list[tuple[Indices, list[float]]]:
         """Return groups of robots and the distances to keep from obstacles, px, in order of trial.
 
@@ -256,7 +268,8 @@ class _Ground:
         """
         near = np.minimum(self._off(starts), self._off(goals))
         clear, free = near > self.radius, self._off(self.ends)
-        least = float(free[free > self.radius].min(initial=self.far))
+        room = self.radius + ROOM_SHARE * math.hypot(self.frame.width, self.frame.height)
+        least = float(free[free > self.radius].min(initial=room))
         keeps = [self.radius + share * (least - self.radius) for share in ROOM_SHARES]
         tight = np.flatnonzero(~clear)
         groups = [

@@ -154,6 +154,17 @@ def test_a_hard_keep_out_is_entered_by_neither_places_nor_paths(
     assert min(region.distance(way) for way in ways) > 2
 
 
+def test_a_way_out_of_the_picture_is_taken_where_there_is_no_other_and_told(
+    tool_calls: Begin,
+) -> None:
+    work = tool_calls(picture(), robot_radius=6.0)
+    work.keep(with_keep_outs(work.context, [TargetPrompt(box=(300, 2, 320, 398))]))
+    notes = propose(work, group("around", 6))["notes"]
+    assert any("leave the picture on the way" in note for note in notes)
+    (met,) = (e for e in work.world.plan().encounters if e.how == "beyond")
+    assert set(met.robots) < set(work.world.plan().plan.formation.robots)
+
+
 def test_a_plan_that_enters_a_keep_out_is_not_certified_and_the_region_changes_the_version(
     tool_calls: Begin,
 ) -> None:

@@ -125,6 +125,48 @@ def test_what_one_robot_stands_on_is_still_in_the_way_of_the_others() -> None:
     assert not crossed(past, thing, 2.0)
 
 
+def left(path: FloatArray, radius: float = 0.0) -> bool:
+    """Whether a body on a path comes out of the picture."""
+    picture = shapely.box(radius, radius, 639 - radius, 479 - radius)
+    return not picture.buffer(1e-6).covers(LineString(path))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.5, 30), st.sampled_from([0.0, 4.0]), st.sampled_from([0.45, 1.0]), SEEDS)
+def test_the_picture_is_not_left_for_more_room_where_a_way_within_it_leads_past(
+    spare: float, radius: float, confidence: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    gap = 2.2 * radius + spare
+    things = [box("c1", 290, gap, 340, 479, confidence), box("c2", 30, 200, 90, 260)]
+    starts = rng.uniform((110, 10), (240, 470), (3, 2))
+    goals = rng.uniform((400, 10), (620, 470), (3, 2))
+    for path in around(starts, goals, things, radius):
+        assert not left(path, radius)
+        assert not any(crossed(path, thing, radius) for thing in things)
+
+
+@pytest.mark.parametrize("confidence", [0.45, 1.0])
+def test_what_the_picture_cuts_off_is_driven_over_not_around_beyond_it(confidence: float) -> None:
+    thing = box("c1", 300, 0, 340, 479, confidence)
+    path = around(ends((50, 100)), ends((600, 240)), [thing, box("c2", 150, 60, 260, 300)], 3.0)[0]
+    assert not left(path, 3.0)
+    assert crossed(path, thing, 3.0)
+    assert not crossed(path, box("c2", 150, 60, 260, 300), 3.0), "that is still driven around"
+
+
+def test_beside_what_is_whole_the_picture_is_left_where_there_is_no_room_within_it() -> None:
+    doubtful, sure = (box("c1", 300, 4, 340, 475, confidence) for confidence in (0.45, 1.0))
+    path = around(ends((50, 100)), ends((600, 240)), [doubtful], 5.0)[0]
+    assert np.array_equal(path, ends((50, 100), (600, 240)))
+    path = around(ends((50, 100)), ends((600, 240)), [sure], 5.0)[0]
+    assert left(path, 5.0)
+    assert not crossed(path, sure, 5.0)
+    path = around(ends((50, 100)), ends((600, 240)), [], 5.0, sure.region)[0]
+    assert left(path, 5.0)
+    assert not crossed(path, sure, 5.0)
+
+
 @settings(max_examples=60, deadline=None)
 @given(SEEDS)
 def test_robots_that_stand_at_a_thing_do_not_drive_over_it(seed: int) -> None:
