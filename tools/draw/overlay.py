@@ -4,7 +4,8 @@ This module only draws: every position, outline and verdict comes from elsewhere
 any size come out at about the same size, so that strokes and text are always legible.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from .marks import (
     draw_met,
     draw_outline,
     draw_robots,
+    draw_ways,
     label_openings,
     number_robots,
     outward_vectors,
@@ -63,26 +65,34 @@ CAGED = {
     "not certified": "may get out",
     "gets out": "can get out",
 }
+NO_WAYS: Mapping[str, FloatArray] = MappingProxyType({})
 NEAR = 2.0
 """Robots are not drawn if a coordinate exceeds this many long sides of the picture."""
 
 
 def draw_plan(
-    picture: Picture, world: World, plan: Plan, title: str, before: Plan | None = None
+    picture: Picture,
+    world: World,
+    plan: Plan,
+    title: str,
+    before: Plan | None = None,
+    ways: Mapping[str, FloatArray] = NO_WAYS,
 ) -> Image.Image:
     """Draw the photograph with the contract, the robots and the verdict.
 
-    Areas where robots' centres may stand are tinted; other things that robots stand on or drive
-    over are orange, and so are rings around the robots that stand on them or at the picture's
-    border. The curves that robots stand along are dashed, see `draw_guides`. Robots with a finding
-    are red with a cross. If a target was found to get out of a cage, its path is shown. If the
-    scale is known, lengths are given in metres too and the footer has a scale bar.
+    Areas where robots' centres may stand are tinted; other things that robots stand on, or drive
+    over or far around, are orange, and so are rings around the robots that stand on them or at the
+    picture's border. The curves that robots stand along are dashed, see `draw_guides`; thin lines
+    lead from circles where robots start. Robots with a finding are red with a cross. If a target
+    was found to get out of a cage, its path is shown. If the scale is known, lengths are given in
+    metres too and the footer has a scale bar.
 
     Args:
         world: the world that the plan was made in.
         plan: certified or not; robots at no finite place, or far outside the picture, are left out.
         title: usually the instruction; in any language, of any length.
         before: the plan that an edit made this one from; arrows show which robots move.
+        ways: (k, 2) px by robot, how they are to get there.
 
     Returns:
         RGB, the photograph's long side 1200 to 1500 px, with a title above and a footer below.
@@ -102,6 +112,7 @@ def draw_plan(
         draw_escape(canvas, plan.verdict.escape, site)
     labels, met = Labels(canvas.photo), world.met(plan.id)
     draw_met(canvas, met.values())
+    draw_ways(canvas, ways.values())
     _draw_robots(canvas, world, plan, labels, before)
     for name, outline in met.items():
         _draw_tag(canvas, name, outline.bounds, MET, labels)

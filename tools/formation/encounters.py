@@ -37,14 +37,16 @@ ROUNDING = 1e-6
 class Encounter(Value):
     """Robots, by id, and an object or the picture's border that they could not be kept off.
 
-    `how` is on or over (the object), border, or beyond: out of the picture and back.
+    `how` is on, over or round (the object), border, or beyond: out of the picture and back. `times`
+    is how often as far as over the object a robot drives that goes a long way round it.
     """
 
-    how: Literal["on", "over", "border", "beyond"]
+    how: Literal["on", "over", "round", "border", "beyond"]
     robots: tuple[str, ...]
     thing: str = ""
     label: str = ""
     sure: bool = True
+    times: float = 1.0
 
     @property
     def sentence(self) -> str:
@@ -54,6 +56,9 @@ class Encounter(Value):
         who = f"Robot{'' if s else 's'} {', '.join(self.robots[:MOST_NAMED])}{more}"
         if self.how == "beyond":
             return f"{who} leave{s} the picture on the way, unseen: no way within it was found."
+        if self.how == "round":
+            far = f"drive{s} up to {self.times:.1f} times as far"
+            return f"{who} {far} to get round {self.thing} ({self.label}) as over it."
         if self.how == "border":
             return f"{who} stand{s} at the picture's very border: what lies beyond is not seen."
         does = f"stand{s} on or right beside" if self.how == "on" else f"drive{s} over"

@@ -165,6 +165,14 @@ def test_a_way_out_of_the_picture_is_taken_where_there_is_no_other_and_told(
     assert set(met.robots) < set(work.world.plan().plan.formation.robots)
 
 
+def test_a_long_way_round_a_line_on_the_floor_is_told(tool_calls: Begin) -> None:
+    work = tool_calls(picture((310, 8, 316, 340)), starts=((345, 200),))
+    (note,) = propose(work, group("along", 1, side="right"))["notes"]
+    assert "times as far to get round c2 (blue thing) as over it" in note
+    (met,) = work.world.plan().encounters
+    assert (met.how, met.robots) == ("round", ("1",))
+
+
 def test_a_plan_that_enters_a_keep_out_is_not_certified_and_the_region_changes_the_version(
     tool_calls: Begin,
 ) -> None:

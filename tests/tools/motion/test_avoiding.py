@@ -7,7 +7,7 @@ import pytest
 import shapely
 from formup.tools.formation.site import Other, Site
 from formup.tools.geometry.outline import FloatArray
-from formup.tools.motion.avoiding import routes_off
+from formup.tools.motion.avoiding import long_ways_round, routes_off
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
@@ -165,6 +165,24 @@ def test_beside_what_is_whole_the_picture_is_left_where_there_is_no_room_within_
     path = around(ends((50, 100)), ends((600, 240)), [], 5.0, sure.region)[0]
     assert left(path, 5.0)
     assert not crossed(path, sure, 5.0)
+
+
+def test_a_long_way_round_is_told_with_what_it_goes_round() -> None:
+    line, target = box("c1", 300, 10, 306, 440), shapely.box(360, 200, 400, 240)
+    site = Site({}, 640, 480, others=(line, box("c2", 20, 20, 60, 60)))
+    starts, goals = (
+        ends((280, 220), (40, 240), (600, 220)),
+        ends((340, 220), (600, 460), (420, 220)),
+    )
+    ways = dict(zip("123", routes_off(starts, goals, target, site, 3.0), strict=True))
+    (met,) = long_ways_round(ways, target, site, 3.0)
+    assert (met.how, met.robots, met.thing) == ("round", ("1",), "c1")
+    assert met.times == pytest.approx(LineString(ways["1"]).length / 60, abs=0.01)
+    assert met.times > 5
+    assert f"{met.times:.1f} times as far to get round c1 (grey thing) as over it" in met.sentence
+    beside = routes_off(starts, goals, shapely.union(line.region, target), site, 3.0)
+    ways = dict(zip("123", beside, strict=True))
+    assert long_ways_round(ways, shapely.union(line.region, target), site, 3.0) == ()
 
 
 @settings(max_examples=60, deadline=None)
