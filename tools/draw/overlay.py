@@ -84,8 +84,7 @@ def draw_plan(
     over or far around, are orange, and so are rings around the robots that stand on them or at the
     picture's border. The curves that robots stand along are dashed, see `draw_guides`; thin lines
     lead from circles where robots start. Robots with a finding are red with a cross. If a target
-    was found to get out of a cage, its path is shown. If the scale is known, lengths are given in
-    metres too and the footer has a scale bar.
+    was found to get out of a cage, its path is shown. A known scale adds metres and a scale bar.
 
     Args:
         world: the world that the plan was made in.
@@ -119,10 +118,7 @@ def draw_plan(
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(canvas, lines)
-    scale = world.metres_per_pixel
-    taken = draw_scale_bar(canvas, scale) if scale else 0.0
-    badge, ground = _badge(plan, scale)
-    draw_footer(canvas, badge, ground, _plan_facts(plan, scale), taken)
+    _draw_verdict(canvas, plan, world.metres_per_pixel)
     return canvas.finish()
 
 
@@ -210,6 +206,13 @@ def idle_robots(world: World, plan: Plan) -> dict[str, FloatArray]:
     busy = set(plan.formation.robots)
     idle = [pose for pose in world.robots if busy and pose.id not in busy]
     return {pose.id: np.array([pose.x, pose.y]) for pose in idle}
+
+
+def _draw_verdict(canvas: Canvas, plan: Plan, scale: float | None) -> None:
+    """Draw the footer: what the certificate says, and a scale bar where the scale is known."""
+    taken = draw_scale_bar(canvas, scale) if scale else 0.0
+    badge, ground = _badge(plan, scale)
+    draw_footer(canvas, badge, ground, _plan_facts(plan, scale), taken)
 
 
 def _badge(plan: Plan, scale: float | None) -> tuple[str, Colour]:
