@@ -21,6 +21,7 @@ from ..formation.encounters import ROOM_SHARE
 from ..formation.placement.place import Site
 from ..geometry.curves import Frame, round_join_dip
 from ..geometry.outline import FloatArray, distances
+from .visibility import Visibility
 
 MAX_NODES, EACH_NODES = 80, 12
 """Most vertices kept of obstacles, and for each further part of them: enough for a path within a
@@ -34,6 +35,8 @@ more than it must. CLOSE is tried where nothing else leads through and bodies ar
 ROOM_SHARES = (0.7, 0.3, 0.03)
 """Shares of the smallest clearance at starts and goals, but at most of the room kept from other
 things, that paths try to keep: away where there is room, squeezing past where there is not."""
+LONG = 1.5
+"""Room is not kept at the cost of ways that are longer by more than this factor."""
 LEAST_EXIT = 1.0
 """How far robots that stand on an obstacle at least go off it, px."""
 ROUND_SEGMENTS = 16
@@ -238,10 +241,7 @@ class _Ground:
         for group, keeps in self._groups(starts, goals):
             left = group
             for keep, frame, bend in self._tries(keeps, len(bodies)):
-                if len(bodies):
-                    graph = _graph_past(self.solid, keep, bodies, frame, bend)
-                else:
-                    graph = _graph(self.solid.wkb, keep, frame, bend)
+                graph = self._graph(keep, bodies, frame, bend)
                 straight = shapely.linestrings(ways[left])
                 left = left[shapely.intersects(straight, graph.barrier)]
                 found = {int(i): graph.path(*ways[i]) for i in left}
@@ -252,7 +252,26 @@ class _Ground:
                     break
             if len(left):
                 raise self._no_route(left, goals, bodies)
+            self._shorten(paths, group, keeps[-1], bodies)
         return paths
+
+    def _shorten(
+        self, paths: list[FloatArray], group: Indices, keep: float, bodies: Bodies
+    ) -> None:
+        """Squeeze past where the way with more room is longer by more than LONG."""
+        far = [i for i in map(int, group) if _longer(paths[i], paths[i][[0, -1]])]
+        if not far:
+            return
+        graph = self._graph(keep, bodies, self.frame, BEND)
+        for i in far:
+            near = graph.path(*paths[i][[0, -1]])
+            if near is not None and _longer(paths[i], near):
+                paths[i] = near
+
+    def _graph(self, keep: float, bodies: Bodies, frame: Frame | None, bend: Bend) -> Visibility:
+        if len(bodies):
+            return _graph_past(self.solid, keep, bodies, frame, bend)
+        return _graph(self.solid.wkb, keep, frame, bend)
 
     def _tries(self, keeps: Sequence[float], bodies: int) -> list[tuple[float, Frame | None, Bend]]:
         """Return the distances to keep, px, frames and bends that are tried in turn."""
@@ -295,14 +314,14 @@ class _Ground:
 
 
 @lru_cache(maxsize=32)
-def _graph(solid: bytes, keep: float, frame: Frame | None, bend: Bend) -> "_Visibility":
+def _graph(solid: bytes, keep: float, frame: Frame | None, bend: Bend) -> Visibility:
     """Return the graph around obstacles alone; cached, since it is needed again and again."""
     return _graph_past(shapely.from_wkb(solid), keep, NOBODIES, frame, bend)
 
 
 def _graph_past(
     solid: BaseGeometry, keep: float, bodies: Bodies, frame: Frame | None, bend: Bend
-) -> "_Visibility":
+) -> Visibility:
     """Return the visibility graph around obstacles and bodies, within a frame if there is one.
 
     Paths must not touch bodies, nor the obstacles grown by nearly `keep`.
@@ -314,7 +333,13 @@ def _graph_past(
     nodes = _nodes(solid, keep, bodies, barrier, bend)
     if frame is not None:
         nodes = nodes[shapely.intersects_xy(frame.box, nodes)]
-    return _Visibility(nodes, barrier)
+    return Visibility(nodes, barrier)
+
+
+def _longer(path: FloatArray, other: FloatArray) -> bool:
+    """Return whether a path is longer than another by more than LONG."""
+    one, two = (float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in (path, other))
+    return one > LONG * two
 
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
@@ -343,44 +368,3 @@ def _nodes(
     bends = shapely.get_coordinates(corners)
     free = bends[~shapely.intersects_xy(barrier, bends)]
     return np.unique(np.concatenate([coordinates, free]), axis=0)
-
-
-class _Visibility:
-    """All-pairs shortest paths among nodes that see each other past a barrier."""
-
-    def __init__(self, nodes: FloatArray, barrier: BaseGeometry) -> None:
-        from scipy.sparse.csgraph import shortest_path
-
-        self.barrier, self._nodes = barrier, nodes
-        if not len(nodes):
-            return
-        lengths = np.stack([self._sight(node) for node in nodes])
-        self._length, self._before = shortest_path(lengths, return_predecessors=True)
-
-    def path(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
-        """Return the shortest path, (k, 2), or None if there is none."""
-        if not len(self._nodes):
-            return None
-        total = self._sight(start)[:, None] + self._length + self._sight(goal)[None, :]
-        first, last = np.unravel_index(int(np.argmin(total)), total.shape)
-        if not np.isfinite(total[first, last]):
-            return None
-        chain = [int(last)]
-        while chain[-1] != first:
-            chain.append(int(self._before[first, chain[-1]]))
-        return np.concatenate([[start], self._nodes[chain[::-1]], [goal]])
-
-    def lengths(self, starts: FloatArray, goals: FloatArray) -> FloatArray:
-        """Return the lengths of the shortest paths from every start to every goal, (n, m) px."""
-        if not len(self._nodes):
-            return np.full((len(starts), len(goals)), np.inf)
-        to_goals = np.stack([self._sight(goal) for goal in goals], axis=1)
-        onward = np.min(self._length[:, :, None] + to_goals[None], axis=1)
-        return np.stack([np.min(self._sight(s)[:, None] + onward, axis=0) for s in starts])
-
-    def _sight(self, point: FloatArray) -> FloatArray:
-        """Return the distance to every node that is seen from a point, infinite for the others."""
-        ends = np.broadcast_to(point, self._nodes.shape)
-        lines = shapely.linestrings(np.stack([ends, self._nodes], axis=1))
-        distance = np.linalg.norm(self._nodes - point, axis=1)
-        return np.where(shapely.intersects(lines, self.barrier), np.inf, distance)

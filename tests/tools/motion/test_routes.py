@@ -122,6 +122,15 @@ def test_how_far_off_robots_are_to_stand_does_not_keep_their_ways_off(clearance:
     assert 3 < solid.distance(LineString(path)) < 3 + 0.02 * np.hypot(640, 480)
 
 
+@pytest.mark.parametrize("gap", [8.0, 16.0, 30.0])
+def test_a_narrow_gap_is_taken_rather_than_a_way_that_is_far_longer(gap: float) -> None:
+    walls = shapely.union(shapely.box(310, 60, 330, 230), shapely.box(310, 230 + gap, 330, 420))
+    starts, goals = np.array([[260.0, 240]]), np.array([[380.0, 240]])
+    (path,) = routes(starts, goals, walls, 3.0, FRAME)
+    assert walls.distance(LineString(path)) > 3
+    assert LineString(path).length < 150
+
+
 def test_many_cornered_targets_are_still_driven_around() -> None:
     rng = np.random.default_rng(1)
     angle = np.linspace(0, 2 * np.pi, 700, endpoint=False)
