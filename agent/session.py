@@ -14,6 +14,7 @@ from typing import Any, TypedDict
 
 from pydantic import ValidationError
 
+from ..tools.builtin.motions import ways_ahead
 from ..tools.context import Artefacts, Context, Services, Settings
 from ..tools.draw import draw_plan, draw_view
 from ..tools.errors import InputError, StorageError
@@ -102,7 +103,9 @@ class Run:
         if plan is None:
             return None
         title = self.report.instruction
-        draw_plan(self.context.picture, self.world, plan, title).save(file, "PNG")
+        ways = ways_ahead(self.context, self.world, plan)
+        drawn = draw_plan(self.context.picture, self.world, plan, title, ways=ways)
+        drawn.save(file, "PNG")
         return file.getvalue()
 
     def view(self) -> bytes | None:

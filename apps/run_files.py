@@ -11,6 +11,7 @@ from typing import Any
 from ..agent.report import suggested
 from ..agent.session import Run
 from ..agent.store.folder import NAME
+from ..tools.builtin.motions import ways_ahead
 from ..tools.builtin.tracks import moved_of, read_track
 from ..tools.context import Context
 from ..tools.draw import FILMS, draw_look, draw_plan, save_film
@@ -117,7 +118,9 @@ def write_files(folder: Folder, run: Run, film: Path | None = None) -> dict[str,
     elif standing:
         files["picture"] = "plan.png"
     elif node is not None:
-        files["picture"] = folder.draw("plan.png", draw_plan(picture, world, node.plan, title))
+        ways = ways_ahead(run.context, world, node.plan)
+        drawn = draw_plan(picture, world, node.plan, title, ways=ways)
+        files["picture"] = folder.draw("plan.png", drawn)
     elif world.targets or world.doubted:
         files["picture"] = folder.draw("found.png", draw_look(picture, world.with_doubted()))
     if (contract := suggested(run.outcome)) is not None:
@@ -148,7 +151,8 @@ def write_turn(folder: Folder, turn: int, run: Run, before: Plan | None) -> dict
         found = draw_look(picture, world.with_doubted())
         files["picture"] = folder.draw(f"found-{turn}.png", found)
     elif node is not None:
-        drawn = draw_plan(picture, world, node.plan, title, before)
+        ways = ways_ahead(run.context, world, node.plan)
+        drawn = draw_plan(picture, world, node.plan, title, before, ways)
         data = plan_file(world, node.plan.id, title, picture)
         files["picture"] = folder.draw(f"plan-{turn}.png", drawn)
         files["plan"] = folder.write(f"plan-{turn}.json", data)

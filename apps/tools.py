@@ -11,6 +11,7 @@ import typer
 
 from ..agent.store.folder import suffix_of
 from ..tools.builtin import TOOLS
+from ..tools.builtin.motions import ways_ahead
 from ..tools.context import Context, Settings
 from ..tools.draw import draw_look, draw_plan
 from ..tools.errors import FleetError, InputError, ToolError
@@ -102,7 +103,8 @@ def _draw(path: Path, context: Context, world: World) -> Path:
     node, file = world.plans.get(next(reversed(world.plans), "")), io.BytesIO()
     drawn = draw_look(context.picture, world)
     if node is not None:
-        drawn = draw_plan(context.picture, world, node.plan, f"plan {node.plan.id}")
+        ways = ways_ahead(context, world, node.plan)
+        drawn = draw_plan(context.picture, world, node.plan, f"plan {node.plan.id}", ways=ways)
     drawn.save(file, "PNG")
     write_whole(path, file.getvalue())
     return path

@@ -17,6 +17,7 @@ from .fleet.protocol import Fleet, Pose
 from .formation.plan import Plan
 from .formation.units import check_scale
 from .formation.value import Value
+from .geometry.outline import FloatArray
 from .perception.detection import Finder
 from .perception.detectors.protocol import Detector
 from .perception.detectors.registry import detector_named
@@ -176,6 +177,7 @@ class Services:
         artefacts: files that events and the world name by their hash.
         found: what detectors found in pictures, by detector, picture, segmenter and phrases; shared
             by all services that are not given their own.
+        ways: how robots were planned to get to plans, (k, 2) px by robot, by the plan's id.
         asked: the same where a model was asked; not shared with other conversations.
         stopped: names of fleets that were stopped when they were closed.
         claim: called with a fleet's name and what opens it; returns the fleet to use, or raises if
@@ -192,6 +194,7 @@ class Services:
     asked: dict[tuple[str, ...], tuple[Candidate, ...]] = field(
         default_factory=dict[tuple[str, ...], tuple[Candidate, ...]]
     )
+    ways: dict[str, dict[str, FloatArray]] = field(default_factory=dict[str, dict[str, FloatArray]])
     stopped: set[str] = field(default_factory=set[str])
     claim: Callable[[str, Callable[[], Fleet]], Awaitable[Fleet]] = _unshared
     watch: Watch = _ignore

@@ -108,7 +108,7 @@ class PlanNode(Value):
         edit: the edits that made it, as JSON.
         words: the person's words that it was made for.
         unseen: targets whose outlines are to be looked at before robots move.
-        encounters: other things that robots stand on or drive over, as far as is known.
+        encounters: other things that robots stand on, or drive over or far around, if known.
         motion: the certificate of the way there from where the robots stood when it was made;
             None where nothing was planned.
     """

@@ -104,7 +104,7 @@ export const draw = () => {
   layers.areas.replaceChildren(...(plan?.areas ?? []).map((rings) => s("path", { class: "area", d: path(rings) })));
   layers.things.replaceChildren(
     ...kept.map((found) => thing(found, "off")),
-    ...met.map((found) => thing(found, "met", `${found.label}: robots stand on it or drive over it`)),
+    ...met.map((found) => thing(found, "met", `${found.label}: robots stand on it, drive over it or go a long way round it`)),
     ...targets.map((found) => thing(found, "target", `${found.id}: ${found.label}, confidence ${found.confidence}`)),
   );
   // A disc does not reach onto what its robot keeps off.

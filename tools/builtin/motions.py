@@ -13,9 +13,10 @@ from ..formation.encounters import Encounter, encounters_of
 from ..formation.plan import Plan
 from ..geometry.assignment import EXACT
 from ..geometry.outline import FloatArray
+from ..motion.avoiding import long_ways_round
 from ..motion.checking import MotionVerdict
 from ..motion.planning import Ground, NoOrderError, Team, assigned, plan_motion
-from ..motion.routes import named_obstacles
+from ..motion.routes import named_obstacles, obstacles
 from ..world import World
 
 SHARING = (
@@ -23,6 +24,10 @@ SHARING = (
     "share true."
 )
 """What a model is told to do about places that cannot each be reached by their own robots."""
+MOST_WAYS = 16
+"""Most plans whose ways are remembered."""
+MOVED_PX = 1.0
+"""A robot that is seen no further from where its way began has not moved, px."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,28 @@ def paths_to(context: Context, plan: Plan) -> dict[str, FloatArray]:
         return {}
     taking, poses = plan.formation.robot_of_place, context.world.robots
     return going(context.world, plan, fleet, poses, taking).paths
+
+
+def remember_ways(context: Context, plan: Plan, found: Going) -> None:
+    """Keep how robots would get to a plan's places, for pictures of it."""
+    ways = context.services.ways
+    ways[plan.id] = found.paths
+    for old in [*ways][:-MOST_WAYS]:
+        del ways[old]
+
+
+def ways_ahead(context: Context, world: World, plan: Plan) -> dict[str, FloatArray]:
+    """Return how robots would get to a plan's places, as planned with it.
+
+    Returns:
+        (k, 2) px by the robot's id; none if that is not known, or a robot has moved since.
+    """
+    ways = context.services.ways.get(plan.id, {})
+    at = {pose.id: (pose.x, pose.y) for pose in world.robots}
+    there = all(
+        robot in at and np.hypot(*(way[0] - at[robot])) <= MOVED_PX for robot, way in ways.items()
+    )
+    return ways if there else {}
 
 
 def going(
@@ -106,11 +133,13 @@ def going(
 
 
 def met_by(world: World, plan: Plan, found: Going | None) -> tuple[Encounter, ...]:
-    """Return the other things that robots of a plan stand on or, on their ways, drive over."""
+    """Return the other things that robots of a plan stand on, or drive over or far around."""
     site = world.site(plan.formation.contract)
     if found is None:
         return encounters_of(plan, site, {}, plan.formation.contract.robot_radius)
-    return encounters_of(plan, site, found.paths, found.radius)
+    met = encounters_of(plan, site, found.paths, found.radius)
+    solid = obstacles(plan.formation.contract, site)
+    return met + long_ways_round(found.paths, solid, site, found.radius)
 
 
 def _assigned_robots(

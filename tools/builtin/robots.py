@@ -35,7 +35,7 @@ from ..motion.routes import obstacles
 from ..tool import in_thread
 from ..world import PlanNode, World
 from .follows import followed, stands_about, watch_target
-from .motions import Going, going, met_by
+from .motions import Going, going, met_by, remember_ways
 from .tracks import with_track
 
 MOST_NAMED = 12
@@ -82,6 +82,7 @@ async def with_robots(
     node = node.model_copy(update={"plan": plan, "motion": found.verdict})
     told += _notes(found, poses)
     node = await in_thread(lambda: _noted(world, node, told, found))
+    remember_ways(context, plan, found)
     return world.having(robots=poses).with_plan(node)
 
 

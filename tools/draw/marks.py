@@ -44,6 +44,8 @@ SIZES = ((NUMBERED, (5.5, 14.0)), (400, (3.0, 8.0)), (np.inf, (1.3, 4.0)))
 """For up to this many robots: the least and greatest radius they are drawn with, units."""
 NEIGHBOUR_SHARE = 0.42
 """A disc's greatest radius as a share of the distance to the nearest neighbour."""
+WAY_START = 3.0
+"""Radius of the circle at which a robot's way begins, units of the page."""
 NUMBER_RADIUS = 9.5
 """Least radius of a disc on which a number is legible, units of the page."""
 
@@ -234,6 +236,20 @@ def draw_idle_robots(canvas: Canvas, points: Mapping[str, FloatArray], radius: f
     """Draw grey discs where robots without a place in the plan stand."""
     for point in points.values():
         canvas.disc(point, radius, IDLE, float(np.clip(0.17 * radius, 0.6, 1.9)))
+
+
+def draw_ways(canvas: Canvas, ways: Collection[FloatArray]) -> None:
+    """Draw the ways, (k, 2) each, that robots are to drive, thinly, from a circle at each start.
+
+    Those that hardly move have none; the more there are, the fainter they are.
+    """
+    reach = WAY_START / canvas.page_length(1.0)
+    ways = [way for way in ways if np.linalg.norm(way - way[0], axis=1).max() > reach]
+    faint = float(np.clip(NUMBERED / max(len(ways), 1), 0.25, 1.0))
+    canvas.strokes(ways, INK, 2.6, 0.45 * faint)
+    canvas.strokes(ways, WHITE, 1.1, 0.9 * faint)
+    for way in ways if len(ways) <= NUMBERED else ():
+        canvas.circle(way[0], WAY_START, WHITE, 1.0)
 
 
 def outward_vectors(contract: Contract, site: Site, points: FloatArray) -> list[FloatArray]:

@@ -4,7 +4,8 @@ This module only draws: every position, outline and verdict comes from elsewhere
 any size come out at about the same size, so that strokes and text are always legible.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from .marks import (
     draw_met,
     draw_outline,
     draw_robots,
+    draw_ways,
     label_openings,
     number_robots,
     outward_vectors,
@@ -63,26 +65,33 @@ CAGED = {
     "not certified": "may get out",
     "gets out": "can get out",
 }
+NO_WAYS: Mapping[str, FloatArray] = MappingProxyType({})
 NEAR = 2.0
 """Robots are not drawn if a coordinate exceeds this many long sides of the picture."""
 
 
 def draw_plan(
-    picture: Picture, world: World, plan: Plan, title: str, before: Plan | None = None
+    picture: Picture,
+    world: World,
+    plan: Plan,
+    title: str,
+    before: Plan | None = None,
+    ways: Mapping[str, FloatArray] = NO_WAYS,
 ) -> Image.Image:
     """Draw the photograph with the contract, the robots and the verdict.
 
-    Areas where robots' centres may stand are tinted; other things that robots stand on or drive
-    over are orange, and so are rings around the robots that stand on them or at the picture's
-    border. The curves that robots stand along are dashed, see `draw_guides`. Robots with a finding
-    are red with a cross. If a target was found to get out of a cage, its path is shown. If the
-    scale is known, lengths are given in metres too and the footer has a scale bar.
+    Areas where robots' centres may stand are tinted; other things that robots stand on, or drive
+    over or far around, are orange, and so are rings around the robots that stand on them or at the
+    picture's border. The curves that robots stand along are dashed, see `draw_guides`; thin lines
+    lead from circles where robots start. Robots with a finding are red with a cross. If a target
+    was found to get out of a cage, its path is shown. A known scale adds metres and a scale bar.
 
     Args:
         world: the world that the plan was made in.
         plan: certified or not; robots at no finite place, or far outside the picture, are left out.
         title: usually the instruction; in any language, of any length.
         before: the plan that an edit made this one from; arrows show which robots move.
+        ways: (k, 2) px by robot, how they are to get there.
 
     Returns:
         RGB, the photograph's long side 1200 to 1500 px, with a title above and a footer below.
@@ -102,16 +111,14 @@ def draw_plan(
         draw_escape(canvas, plan.verdict.escape, site)
     labels, met = Labels(canvas.photo), world.met(plan.id)
     draw_met(canvas, met.values())
+    draw_ways(canvas, ways.values())
     _draw_robots(canvas, world, plan, labels, before)
     for name, outline in met.items():
         _draw_tag(canvas, name, outline.bounds, MET, labels)
     if drivable:
         label_openings(canvas, contract, site, points, labels)
     draw_bars(canvas, lines)
-    scale = world.metres_per_pixel
-    taken = draw_scale_bar(canvas, scale) if scale else 0.0
-    badge, ground = _badge(plan, scale)
-    draw_footer(canvas, badge, ground, _plan_facts(plan, scale), taken)
+    _draw_verdict(canvas, plan, world.metres_per_pixel)
     return canvas.finish()
 
 
@@ -181,7 +188,7 @@ def _draw_robots(
     draw_idle_robots(canvas, idle_robots(world, plan), radius)
     node = world.plans.get(plan.id)
     for encounter in node.encounters if node is not None and near.all() else ():
-        for robot in encounter.robots if encounter.how != "over" else ():
+        for robot in encounter.robots if encounter.how in ("on", "border") else ():
             canvas.circle(shown[robot], 1.7 * radius, MET, max(0.3 * radius, 1.2))
     if near.all():
         draw_moves(canvas, moves_between(before, plan), radius)
@@ -199,6 +206,13 @@ def idle_robots(world: World, plan: Plan) -> dict[str, FloatArray]:
     busy = set(plan.formation.robots)
     idle = [pose for pose in world.robots if busy and pose.id not in busy]
     return {pose.id: np.array([pose.x, pose.y]) for pose in idle}
+
+
+def _draw_verdict(canvas: Canvas, plan: Plan, scale: float | None) -> None:
+    """Draw the footer: what the certificate says, and a scale bar where the scale is known."""
+    taken = draw_scale_bar(canvas, scale) if scale else 0.0
+    badge, ground = _badge(plan, scale)
+    draw_footer(canvas, badge, ground, _plan_facts(plan, scale), taken)
 
 
 def _badge(plan: Plan, scale: float | None) -> tuple[str, Colour]:

@@ -31,19 +31,22 @@ SAME, SMALL = 0.2, 0.5
 """Regions that share more than SAME of the smaller one are the same object, or one is part of the
 other. On a target that robots enter, a sure object below SMALL of its area stays separate."""
 MOST_NOTES, MOST_NAMED = 8, 12
+ROUNDING = 1e-6
 
 
 class Encounter(Value):
     """Robots, by id, and an object or the picture's border that they could not be kept off.
 
-    `how` is on or over (the object), or border.
+    `how` is on, over or round (the object), border, or beyond: out of the picture and back. `times`
+    is how often as far as over the object a robot drives that goes a long way round it.
     """
 
-    how: Literal["on", "over", "border"]
+    how: Literal["on", "over", "round", "border", "beyond"]
     robots: tuple[str, ...]
     thing: str = ""
     label: str = ""
     sure: bool = True
+    times: float = 1.0
 
     @property
     def sentence(self) -> str:
@@ -51,6 +54,11 @@ class Encounter(Value):
         s = "s" if len(self.robots) == 1 else ""
         more = ", ..." if len(self.robots) > MOST_NAMED else ""
         who = f"Robot{'' if s else 's'} {', '.join(self.robots[:MOST_NAMED])}{more}"
+        if self.how == "beyond":
+            return f"{who} leave{s} the picture on the way, unseen: no way within it was found."
+        if self.how == "round":
+            far = f"drive{s} up to {self.times:.1f} times as far"
+            return f"{who} {far} to get round {self.thing} ({self.label}) as over it."
         if self.how == "border":
             return f"{who} stand{s} at the picture's very border: what lies beyond is not seen."
         does = f"stand{s} on or right beside" if self.how == "on" else f"drive{s} over"
@@ -105,7 +113,7 @@ def room_of(site: Site) -> float:
 def encounters_of(
     plan: Plan, site: Site, paths: Mapping[str, FloatArray], radius: float
 ) -> tuple[Encounter, ...]:
-    """Return what robots stand on or drive over outside their contract, and who is cut off.
+    """Return what robots stand on or drive over outside their contract, and who is not seen.
 
     Args:
         plan: the formation.
@@ -130,6 +138,19 @@ def encounters_of(
         met = Encounter(how="on", robots=on, thing=thing.id, label=thing.label, sure=thing.sure)
         found += [met, met.model_copy(update={"how": "over", "robots": moving})]
     found.sort(key=lambda e: (not e.sure, e.how))
+    room, ways = site.frame(radius).box, paths.items()
+    out = () if room.is_empty else tuple(n for n, way in ways if _goes_beyond(room, way))
+    beyond = Encounter(how="beyond", robots=tuple(sorted(out, key=rank.__getitem__)))
     frame = site.frame(body).box
     cut = () if frame.is_empty else placed(distances(frame.exterior, points) < AT_BORDER)
-    return tuple(e for e in (*found, Encounter(how="border", robots=cut)) if e.robots)
+    border = Encounter(how="border", robots=cut)
+    return tuple(e for e in (beyond, *found, border) if e.robots)
+
+
+def _goes_beyond(room: Polygon, path: FloatArray) -> bool:
+    """Return whether a path, (k, 2), comes further out of a rectangle than where it begins or ends.
+
+    Between two of its vertices no path comes further out than at one of them.
+    """
+    out = distances(room, path)
+    return bool(out.max() > max(out[0], out[-1]) + ROUNDING)

@@ -17,9 +17,11 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError
 from ..formation.contract import MIN_SPACING, Contract
+from ..formation.encounters import ROOM_SHARE
 from ..formation.placement.place import Site
 from ..geometry.curves import Frame, round_join_dip
 from ..geometry.outline import FloatArray, distances
+from .visibility import Visibility
 
 MAX_NODES, EACH_NODES = 80, 12
 """Most vertices kept of obstacles, and for each further part of them: enough for a path within a
@@ -31,8 +33,10 @@ FEW = 12
 """A bend has so many segments per quarter circle around a corner, and keeps off it by this share
 more than it must. CLOSE is tried where nothing else leads through and bodies are at most FEW."""
 ROOM_SHARES = (0.7, 0.3, 0.03)
-"""Shares of the smallest clearance at starts and goals that paths try to keep: well away where
-there is room, squeezing past where there is not."""
+"""Shares of the smallest clearance at starts and goals, but at most of the room kept from other
+things, that paths try to keep: away where there is room, squeezing past where there is not."""
+LONG = 1.5
+"""Room is not kept at the cost of ways that are longer by more than this factor."""
 LEAST_EXIT = 1.0
 """How far robots that stand on an obstacle at least go off it, px."""
 ROUND_SEGMENTS = 16
@@ -80,11 +84,12 @@ def routes(
     *,
     idle: FloatArray = NOBODY,
     ends: FloatArray | None = None,
+    bounded: bool = False,
 ) -> list[FloatArray]:
     """Return shortest paths from start i to goal i, off obstacles and robots that do not move.
 
-    Paths leave the frame only where there is no other way. A robot that stands on an obstacle first
-    leaves it by the shortest way.
+    Paths leave the frame only where there is no other way, if at all. A robot that stands on an
+    obstacle first leaves it by the shortest way.
 
     Args:
         starts: (n, 2).
@@ -95,6 +100,7 @@ def routes(
         idle: (m, 2) where robots stand that do not move.
         ends: (k, 2) starts and goals of all calls in a row, so that all keep the same distance from
             obstacles.
+        bounded: whether a way that leaves the frame counts as none.
 
     Returns:
         n polylines, (k, 2) each.
@@ -104,7 +110,7 @@ def routes(
     """
     own = np.concatenate([starts, goals])
     ends = own if ends is None else ends
-    ground = _Ground(solid, radius, frame, ends)
+    ground = _Ground(solid, radius, frame, ends, bounded)
     wider = _bodies(idle, own, SPARE * radius)
     exits, entries = ground.exits(starts, goals, wider), ground.exits(goals, goals, wider)
     bodies = _bodies(idle, np.concatenate([own, exits, entries]), radius)
@@ -135,12 +141,15 @@ def way_lengths(
     """
     from scipy.spatial.distance import cdist
 
-    graph = _graph(solid.wkb, radius, None, BEND)
+    graph = _graph(solid.wkb, radius, frame, BEND)
     lengths = cdist(starts, goals)
     lines = np.stack(np.broadcast_arrays(starts[:, None], goals[None]), axis=2)
     bent = shapely.intersects(shapely.linestrings(lines), graph.barrier)
     if bent.any():
         lengths[bent] = graph.lengths(starts, goals)[bent]
+    if (shut := np.isinf(lengths)).any():
+        beyond = _graph(solid.wkb, radius, None, BEND)
+        lengths[shut] = beyond.lengths(starts, goals)[shut]
     return lengths
 
 
@@ -173,6 +182,7 @@ class _Ground:
     radius: float
     frame: Frame
     ends: FloatArray
+    bounded: bool = False
 
     def exits(self, starts: FloatArray, goals: FloatArray, bodies: Bodies) -> FloatArray:
         """Return starts, (n, 2), those on obstacles moved off as far as the nearest goal is."""
@@ -230,13 +240,8 @@ class _Ground:
         paths = list(ways)
         for group, keeps in self._groups(starts, goals):
             left = group
-            tries = [(keep, self.frame, BEND) for keep in keeps] + [(keeps[-1], None, BEND)]
-            tries += [(keeps[-1], None, CLOSE)] if len(bodies) <= FEW else []
-            for keep, frame, bend in tries:
-                if len(bodies):
-                    graph = _graph_past(self.solid, keep, bodies, frame, bend)
-                else:
-                    graph = _graph(self.solid.wkb, keep, frame, bend)
+            for keep, frame, bend in self._tries(keeps, len(bodies)):
+                graph = self._graph(keep, bodies, frame, bend)
                 straight = shapely.linestrings(ways[left])
                 left = left[shapely.intersects(straight, graph.barrier)]
                 found = {int(i): graph.path(*ways[i]) for i in left}
@@ -247,7 +252,33 @@ class _Ground:
                     break
             if len(left):
                 raise self._no_route(left, goals, bodies)
+            self._shorten(paths, group, keeps[-1], bodies)
         return paths
+
+    def _shorten(
+        self, paths: list[FloatArray], group: Indices, keep: float, bodies: Bodies
+    ) -> None:
+        """Squeeze past where the way with more room is longer by more than LONG."""
+        far = [i for i in map(int, group) if _longer(paths[i], paths[i][[0, -1]])]
+        if not far:
+            return
+        graph = self._graph(keep, bodies, self.frame, BEND)
+        for i in far:
+            near = graph.path(*paths[i][[0, -1]])
+            if near is not None and _longer(paths[i], near):
+                paths[i] = near
+
+    def _graph(self, keep: float, bodies: Bodies, frame: Frame | None, bend: Bend) -> Visibility:
+        if len(bodies):
+            return _graph_past(self.solid, keep, bodies, frame, bend)
+        return _graph(self.solid.wkb, keep, frame, bend)
+
+    def _tries(self, keeps: Sequence[float], bodies: int) -> list[tuple[float, Frame | None, Bend]]:
+        """Return the distances to keep, px, frames and bends that are tried in turn."""
+        bends = [BEND, CLOSE] if bodies <= FEW else [BEND]
+        tries: list[tuple[float, Frame | None, Bend]] = [(k, self.frame, BEND) for k in keeps]
+        tries += [(keeps[-1], self.frame, bend) for bend in bends[1:]]
+        return tries + [(keeps[-1], None, bend) for bend in bends if not self.bounded]
 
     def _groups(self, starts: FloatArray, goals: FloatArray) -> list[tuple[Indices, list[float]]]:
         """Return groups of robots and the distances to keep from obstacles, px, in order of trial.
@@ -256,7 +287,8 @@ class _Ground:
         """
         near = np.minimum(self._off(starts), self._off(goals))
         clear, free = near > self.radius, self._off(self.ends)
-        least = float(free[free > self.radius].min(initial=self.far))
+        room = self.radius + ROOM_SHARE * math.hypot(self.frame.width, self.frame.height)
+        least = float(free[free > self.radius].min(initial=room))
         keeps = [self.radius + share * (least - self.radius) for share in ROOM_SHARES]
         tight = np.flatnonzero(~clear)
         groups = [
@@ -282,14 +314,14 @@ class _Ground:
 
 
 @lru_cache(maxsize=32)
-def _graph(solid: bytes, keep: float, frame: Frame | None, bend: Bend) -> "_Visibility":
+def _graph(solid: bytes, keep: float, frame: Frame | None, bend: Bend) -> Visibility:
     """Return the graph around obstacles alone; cached, since it is needed again and again."""
     return _graph_past(shapely.from_wkb(solid), keep, NOBODIES, frame, bend)
 
 
 def _graph_past(
     solid: BaseGeometry, keep: float, bodies: Bodies, frame: Frame | None, bend: Bend
-) -> "_Visibility":
+) -> Visibility:
     """Return the visibility graph around obstacles and bodies, within a frame if there is one.
 
     Paths must not touch bodies, nor the obstacles grown by nearly `keep`.
@@ -301,7 +333,13 @@ def _graph_past(
     nodes = _nodes(solid, keep, bodies, barrier, bend)
     if frame is not None:
         nodes = nodes[shapely.intersects_xy(frame.box, nodes)]
-    return _Visibility(nodes, barrier)
+    return Visibility(nodes, barrier)
+
+
+def _longer(path: FloatArray, other: FloatArray) -> bool:
+    """Return whether a path is longer than another by more than LONG."""
+    one, two = (float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in (path, other))
+    return one > LONG * two
 
 
 def along(paths: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
@@ -330,44 +368,3 @@ def _nodes(
     bends = shapely.get_coordinates(corners)
     free = bends[~shapely.intersects_xy(barrier, bends)]
     return np.unique(np.concatenate([coordinates, free]), axis=0)
-
-
-class _Visibility:
-    """All-pairs shortest paths among nodes that see each other past a barrier."""
-
-    def __init__(self, nodes: FloatArray, barrier: BaseGeometry) -> None:
-        from scipy.sparse.csgraph import shortest_path
-
-        self.barrier, self._nodes = barrier, nodes
-        if not len(nodes):
-            return
-        lengths = np.stack([self._sight(node) for node in nodes])
-        self._length, self._before = shortest_path(lengths, return_predecessors=True)
-
-    def path(self, start: FloatArray, goal: FloatArray) -> FloatArray | None:
-        """Return the shortest path, (k, 2), or None if there is none."""
-        if not len(self._nodes):
-            return None
-        total = self._sight(start)[:, None] + self._length + self._sight(goal)[None, :]
-        first, last = np.unravel_index(int(np.argmin(total)), total.shape)
-        if not np.isfinite(total[first, last]):
-            return None
-        chain = [int(last)]
-        while chain[-1] != first:
-            chain.append(int(self._before[first, chain[-1]]))
-        return np.concatenate([[start], self._nodes[chain[::-1]], [goal]])
-
-    def lengths(self, starts: FloatArray, goals: FloatArray) -> FloatArray:
-        """Return the lengths of the shortest paths from every start to every goal, (n, m) px."""
-        if not len(self._nodes):
-            return np.full((len(starts), len(goals)), np.inf)
-        to_goals = np.stack([self._sight(goal) for goal in goals], axis=1)
-        onward = np.min(self._length[:, :, None] + to_goals[None], axis=1)
-        return np.stack([np.min(self._sight(s)[:, None] + onward, axis=0) for s in starts])
-
-    def _sight(self, point: FloatArray) -> FloatArray:
-        """Return the distance to every node that is seen from a point, infinite for the others."""
-        ends = np.broadcast_to(point, self._nodes.shape)
-        lines = shapely.linestrings(np.stack([ends, self._nodes], axis=1))
-        distance = np.linalg.norm(self._nodes - point, axis=1)
-        return np.where(shapely.intersects(lines, self.barrier), np.inf, distance)

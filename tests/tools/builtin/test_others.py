@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 import shapely
+from formup.tools.builtin.motions import ways_ahead
 from formup.tools.builtin.others import with_keep_outs, with_others
 from formup.tools.builtin.tracks import read_track
 from formup.tools.context import Context, Services, Settings
@@ -152,6 +153,39 @@ def test_a_hard_keep_out_is_entered_by_neither_places_nor_paths(
     track = read_track(work.context.services.artefacts.get(arrival.track))
     ways = [LineString(track.points[:, i]) for i in range(track.points.shape[1])]
     assert min(region.distance(way) for way in ways) > 2
+
+
+def test_a_way_out_of_the_picture_is_taken_where_there_is_no_other_and_told(
+    tool_calls: Begin,
+) -> None:
+    work = tool_calls(picture(), robot_radius=6.0)
+    work.keep(with_keep_outs(work.context, [TargetPrompt(box=(300, 2, 320, 398))]))
+    notes = propose(work, group("around", 6))["notes"]
+    assert any("leave the picture on the way" in note for note in notes)
+    (met,) = (e for e in work.world.plan().encounters if e.how == "beyond")
+    assert set(met.robots) < set(work.world.plan().plan.formation.robots)
+
+
+def test_a_long_way_round_a_line_on_the_floor_is_told(tool_calls: Begin) -> None:
+    work = tool_calls(picture((310, 8, 316, 340)), starts=((345, 200),))
+    (note,) = propose(work, group("along", 1, side="right"))["notes"]
+    assert "times as far to get round c2 (blue thing) as over it" in note
+    (met,) = work.world.plan().encounters
+    assert (met.how, met.robots) == ("round", ("1",))
+
+
+def test_the_ways_of_a_plan_are_known_until_its_robots_move(tool_calls: Begin) -> None:
+    work = tool_calls(picture(NEAR))
+    propose(work, group("around", 4))
+    plan = work.world.plan().plan
+    ways = ways_ahead(work.context, work.world, plan)
+    places = dict(zip(plan.formation.robots, plan.formation.positions, strict=True))
+    assert {pose.id: (pose.x, pose.y) for pose in work.world.robots} == {
+        robot: tuple(way[0].tolist()) for robot, way in ways.items()
+    }
+    assert all(way[-1].tolist() == pytest.approx(places[robot]) for robot, way in ways.items())
+    work.call("deploy")
+    assert ways_ahead(work.context, work.world, plan) == {}
 
 
 def test_a_plan_that_enters_a_keep_out_is_not_certified_and_the_region_changes_the_version(

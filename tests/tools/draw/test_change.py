@@ -52,6 +52,21 @@ def test_arrows_lead_from_old_places_and_hide_no_new_one() -> None:
         assert not differs(shown, plain, x / 300, y / 200)
 
 
+def test_ways_lead_from_where_robots_start_and_hide_no_place() -> None:
+    after = plan(AFTER)
+    ways = {"1": np.array([(100, 20), (150, 60), AFTER["1"]], dtype=float)}
+    plain = np.asarray(draw_plan(PICTURE, WORLD, after, ""))
+    shown = np.asarray(draw_plan(PICTURE, WORLD, after, "", ways=ways))
+    photo = slice(0, round(200 * plain.shape[1] / 300))
+    shown, plain = shown[photo], plain[photo]
+    for x, y in ((100, 20), (125, 40), (150, 60), (100, 55)):
+        assert differs(shown, plain, x / 300, y / 200)
+    for x, y in AFTER.values():
+        assert not differs(shown, plain, x / 300, y / 200)
+    stays = {"1": np.array([AFTER["1"], AFTER["1"]], dtype=float)}
+    assert (np.asarray(draw_plan(PICTURE, WORLD, after, "", ways=stays))[photo] == plain).all()
+
+
 def test_a_small_picture_fits_its_room_and_shows_moves() -> None:
     for room in ((80, 60), (60, 80), (7, 5)):
         small = draw_small(PICTURE, WORLD, plan(AFTER), plan(BEFORE), room)

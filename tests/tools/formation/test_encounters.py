@@ -103,6 +103,20 @@ def test_every_robot_on_over_or_cut_off_is_named_with_the_thing() -> None:
     assert "border" in said[2]
 
 
+def test_who_leaves_the_picture_on_the_way_is_named_and_who_only_comes_into_it_is_not() -> None:
+    site, free = Site({}, 640, 480), Group(relation="shape", robots=3)
+    places = [(400.0, 300.0), (500.0, 300.0), (600.0, 300.0)]
+    plan = make_plan(Contract(groups=(free,)), site, "s", places)
+    ways = {
+        "1": np.array([(50.0, 50), (200, 2), places[0]]),
+        "2": np.array([(50.0, 90), (200, 7), places[1]]),
+        "3": np.array([(50.0, -30), places[2]]),
+    }
+    assert [(e.how, e.robots) for e in encounters_of(plan, site, ways, 5.0)] == [("beyond", ("1",))]
+    (said,) = notes_of(encounters_of(plan, site, ways, 5.0))
+    assert said.startswith("Robot 1 leaves the picture on the way")
+
+
 def test_more_than_anybody_reads_are_counted() -> None:
     many = [Encounter(how="on", robots=("1", "2"), thing=f"c{k}", label="x") for k in range(12)]
     assert len(notes_of(many)) == MOST_NOTES + 1

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from formup.tools.formation.site import Other, Site
 from formup.tools.geometry.outline import FloatArray
-from formup.tools.motion.avoiding import routes_off
+from formup.tools.motion.avoiding import long_ways_round, routes_off
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
@@ -123,6 +123,66 @@ def test_what_one_robot_stands_on_is_still_in_the_way_of_the_others() -> None:
     on, past = around(starts, goals, [thing], 2.0)
     assert crossed(on, thing)
     assert not crossed(past, thing, 2.0)
+
+
+def left(path: FloatArray, radius: float = 0.0) -> bool:
+    """Whether a body on a path comes out of the picture."""
+    picture = shapely.box(radius, radius, 639 - radius, 479 - radius)
+    return not picture.buffer(1e-6).covers(LineString(path))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.5, 30), st.sampled_from([0.0, 4.0]), st.sampled_from([0.45, 1.0]), SEEDS)
+def test_the_picture_is_not_left_for_more_room_where_a_way_within_it_leads_past(
+    spare: float, radius: float, confidence: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    gap = 2.2 * radius + spare
+    things = [box("c1", 290, gap, 340, 479, confidence), box("c2", 30, 200, 90, 260)]
+    starts = rng.uniform((110, 10), (240, 470), (3, 2))
+    goals = rng.uniform((400, 10), (620, 470), (3, 2))
+    for path in around(starts, goals, things, radius):
+        assert not left(path, radius)
+        assert not any(crossed(path, thing, radius) for thing in things)
+
+
+@pytest.mark.parametrize("confidence", [0.45, 1.0])
+def test_what_the_picture_cuts_off_is_driven_over_not_around_beyond_it(confidence: float) -> None:
+    thing = box("c1", 300, 0, 340, 479, confidence)
+    path = around(ends((50, 100)), ends((600, 240)), [thing, box("c2", 150, 60, 260, 300)], 3.0)[0]
+    assert not left(path, 3.0)
+    assert crossed(path, thing, 3.0)
+    assert not crossed(path, box("c2", 150, 60, 260, 300), 3.0), "that is still driven around"
+
+
+def test_beside_what_is_whole_the_picture_is_left_where_there_is_no_room_within_it() -> None:
+    doubtful, sure = (box("c1", 300, 4, 340, 475, confidence) for confidence in (0.45, 1.0))
+    path = around(ends((50, 100)), ends((600, 240)), [doubtful], 5.0)[0]
+    assert np.array_equal(path, ends((50, 100), (600, 240)))
+    path = around(ends((50, 100)), ends((600, 240)), [sure], 5.0)[0]
+    assert left(path, 5.0)
+    assert not crossed(path, sure, 5.0)
+    path = around(ends((50, 100)), ends((600, 240)), [], 5.0, sure.region)[0]
+    assert left(path, 5.0)
+    assert not crossed(path, sure, 5.0)
+
+
+def test_a_long_way_round_is_told_with_what_it_goes_round() -> None:
+    line, target = box("c1", 300, 10, 306, 440), shapely.box(360, 200, 400, 240)
+    site = Site({}, 640, 480, others=(line, box("c2", 20, 20, 60, 60)))
+    starts, goals = (
+        ends((280, 220), (40, 240), (600, 220)),
+        ends((340, 220), (600, 460), (420, 220)),
+    )
+    ways = dict(zip("123", routes_off(starts, goals, target, site, 3.0), strict=True))
+    (met,) = long_ways_round(ways, target, site, 3.0)
+    assert (met.how, met.robots, met.thing) == ("round", ("1",), "c1")
+    assert met.times == pytest.approx(LineString(ways["1"]).length / 60, abs=0.01)
+    assert met.times > 5
+    assert f"{met.times:.1f} times as far to get round c1 (grey thing) as over it" in met.sentence
+    beside = routes_off(starts, goals, shapely.union(line.region, target), site, 3.0)
+    ways = dict(zip("123", beside, strict=True))
+    assert long_ways_round(ways, shapely.union(line.region, target), site, 3.0) == ()
 
 
 @settings(max_examples=60, deadline=None)

@@ -7,7 +7,7 @@ from formup.tools.formation.contract import Contract, Group
 from formup.tools.formation.placement.place import Site
 from formup.tools.geometry.curves import Frame
 from formup.tools.geometry.outline import FloatArray, distances, make_outline
-from formup.tools.motion.routes import NoRouteError, along, obstacles, routes
+from formup.tools.motion.routes import NoRouteError, along, obstacles, routes, way_lengths
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Polygon
@@ -83,6 +83,52 @@ def test_a_way_round_stays_in_the_picture_where_one_does() -> None:
     path = routes(np.array([[100.0, 400]]), np.array([[500.0, 400]]), solid, 5.0, FRAME)[0]
     assert path[:, 1].max() <= 479, "below the target there is no room inside the picture"
     assert path[:, 1].min() >= 0
+
+
+@pytest.mark.parametrize("gap", [11.0, 13.0, 40.0])
+def test_a_way_round_squeezes_past_within_the_picture_before_it_leaves_it(gap: float) -> None:
+    solid, radius = shapely.box(250, gap, 400, 479), 5.0
+    starts, goals = np.array([[60.0, 400]]), np.array([[580.0, 400]])
+    (path,) = routes(starts, goals, solid, radius, Frame(640, 480, radius))
+    assert radius <= path[:, 1].min() <= path[:, 1].max() <= 479 - radius
+    assert solid.distance(LineString(path)) > radius
+
+
+def test_a_way_that_leaves_the_picture_is_none_where_it_is_to_be_kept() -> None:
+    starts, goals = np.array([[60.0, 400], [60, 300]]), np.array([[580.0, 400], [100, 300]])
+    solid, frame = shapely.box(250, 4, 400, 479), Frame(640, 480, 5.0)
+    assert routes(starts, goals, solid, 5.0, frame)[0][:, 1].max() > 479
+    with pytest.raises(NoRouteError) as refused:
+        routes(starts, goals, solid, 5.0, frame, bounded=True)
+    assert refused.value.robots.tolist() == [0]
+
+
+def test_who_goes_where_is_decided_by_ways_within_the_picture() -> None:
+    solid, frame = shapely.box(250, 60, 400, 475), Frame(640, 480, 5.0)
+    starts, goals = np.array([[200.0, 400]]), np.array([[450.0, 400]])
+    (path,) = routes(starts, goals, solid, 5.0, frame)
+    length = way_lengths(starts, goals, solid, 5.0, frame)[0, 0]
+    assert length == pytest.approx(LineString(path).length, rel=0.05)
+    shut = shapely.box(250, 0, 400, 479)
+    assert np.isfinite(way_lengths(starts, goals, shut, 5.0, frame)).all()
+
+
+@pytest.mark.parametrize("clearance", [20.0, 100.0, 150.0])
+def test_how_far_off_robots_are_to_stand_does_not_keep_their_ways_off(clearance: float) -> None:
+    solid = shapely.box(300, 220, 340, 260)
+    starts = np.array([[300.0 - clearance, 240]])
+    goals = np.array([[340.0 + clearance, 240]])
+    (path,) = routes(starts, goals, solid, 3.0, FRAME)
+    assert 3 < solid.distance(LineString(path)) < 3 + 0.02 * np.hypot(640, 480)
+
+
+@pytest.mark.parametrize("gap", [8.0, 16.0, 30.0])
+def test_a_narrow_gap_is_taken_rather_than_a_way_that_is_far_longer(gap: float) -> None:
+    walls = shapely.union(shapely.box(310, 60, 330, 230), shapely.box(310, 230 + gap, 330, 420))
+    starts, goals = np.array([[260.0, 240]]), np.array([[380.0, 240]])
+    (path,) = routes(starts, goals, walls, 3.0, FRAME)
+    assert walls.distance(LineString(path)) > 3
+    assert LineString(path).length < 150
 
 
 def test_many_cornered_targets_are_still_driven_around() -> None:
