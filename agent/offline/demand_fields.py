@@ -265,6 +265,10 @@ class Fields(Portions):
     def _at_each(self, demand: Demand) -> bool:
         if self.reading.relation != "corners" or any(q.whole is None for q in demand.numbers):
             return False
+        first, *after = self.items[demand.first : demand.last]
+        each = not {"each", "every", "per", "a", "an"}.isdisjoint(i.symbol for i in after)
+        if each and first.quantity is not None and first.quantity.whole != 1:
+            return False  # several at each of them
         self.corners += [q.whole for q in demand.numbers if q.whole and q.whole > 1]
         self.reading.one_a_corner = not self.corners
         return True

@@ -19,6 +19,8 @@ from .tagging import Tagging, Token
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
 ALWAYS = ("a negation", "a cancellation", "something past", "another task", "a span of time")
 """Kinds of stops that also count in words that look like background beside an order."""
+POINTING = ("no", "the", "each", "every", "any", "this", "that", "single", "next")
+"""Words before a "one" that stands for a noun."""
 PURPOSES = ("closure",)
 """What is also demanded by what sounds like background: "so that it cannot get out"."""
 OF_ROBOTS = re.compile(
@@ -112,7 +114,7 @@ def _is_plain(quantity: Quantity, words: Sequence[Token], labels: dict[int, str]
     if quantity.wording.lower() != "one":
         return True
     before = next((w.text for w in reversed(words) if w.end <= quantity.start), "")
-    return before not in ("no", "the", "each", "every", "any", "this", "that", "single") and (
+    return before not in POINTING and (
         after not in ("after", "by", "another", "behind", "beside", "next", "to", *_table()["rows"])
     )
 

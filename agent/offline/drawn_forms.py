@@ -113,10 +113,12 @@ def _figure(text: str) -> Found:
     names = "|".join(CORNERED)
     tips = rf"(?:(?P<tips>{COUNT})[- ]pointed\s+)?"
     figure = (
-        rf"an?\s+{SIZES}(?:regular\s+)?"
+        rf"{SIZES}(?:regular\s+)?"
         rf"(?:{tips}(?P<star>star)|(?P<name>{names}))(?![\w-]|\s+of\s+the)"
     )
-    found = re.search(rf"(?i)(?:{MAKE}|{STAND}){figure}", text)
+    led, begun = rf"(?i)(?:{MAKE}|{STAND})an?\s+{figure}", r"(?i)(?P<kept>^\s*)(?:an?\s+)?"
+    by = r"(?=\s+(?:a?round|about|with|left of|right of|above|below)\b)"
+    found = re.search(led, text) or re.search(f"{begun}{figure}{by}", text)
     if found is None:
         return None
     if found["name"]:

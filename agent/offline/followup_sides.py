@@ -248,13 +248,8 @@ def arrange(slots: Slots, said: Utterance) -> Effects:
         return target(slots, said)
     if relation == "between":
         return None
-    partly = said.standing.groups[0].get("sides")
-    if relation == "around" == said.standing.relation and partly and not named[1:]:
-        return [{"kind": "close"}]
     if relation == said.standing.relation and not slots.has("px", "flank", "side"):
-        if said.standing.apart:
-            return [{"kind": "merge"}]
-        return [{"kind": "talk", "about": "already"}]
+        return [_whole_again(said)]
     demands = group_of(relation, slots)
     if len(said.standing.targets) > len(said.standing.groups) and len(current) == 1:
         demands["targets"] = current  # one of two things
@@ -262,6 +257,13 @@ def arrange(slots: Slots, said: Utterance) -> Effects:
     if "px" in slots:
         edits.append({"kind": "distance", "px": float(slots["px"][0])})
     return edits
+
+
+def _whole_again(said: Utterance) -> Effect:
+    """Return what makes the arrangement that stands whole where robots or sides are left out."""
+    if said.standing.relation == "around" and said.standing.groups[0].get("sides"):
+        return {"kind": "close"}
+    return {"kind": "merge"} if said.standing.apart else {"kind": "talk", "about": "already"}
 
 
 def _straight(slots: Slots, said: Utterance) -> Effects:

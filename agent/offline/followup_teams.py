@@ -349,6 +349,10 @@ def even_out(slots: Slots, said: Utterance) -> Effects:
 
 def few_away(slots: Slots, said: Utterance) -> Effects:
     """Read "two away" as robots to remove: a number this small is not in pixels."""
+    if re.fullmatch(r"\W*[2-9] out\W*", said.words):
+        n = whole(slots)
+        options = (f"take {n} robots away", f"robot {n} leaves", f"robot {n} further out")
+        return ask(f"{n} robots, or robot {n}?", *options)
     few = slots["num"][0] < LEAST_BARE
     return remove_some(slots, said) if few else None
 

@@ -23,7 +23,8 @@ SIDE_OF = re.compile(
     r"(?=it|this|that|the (?!two|three|four|\w+[^\Wsu]s\b))"
 )
 FURTHER = re.compile(
-    r"(?:(?:,|;|and|plus|with|then|also|put|another|a further|the other) )+(?:\w+(?: - \w+)? )"
+    r"(?:(?:,|;|and|plus|with|then|also|put|another|a further|the other) )+"
+    r"(?:(?:a|half a) )?(?:\w+(?: - \w+)? )"
     r"(?:(?:more|others?|further|extra|robots?|bots?|drones?|units?|ones?|of them|go|stand) )*"
     r"(?:on|at|to|along|in|above|below|over|under|beneath|underneath|left|right|by|around)\b"
 )
@@ -68,11 +69,10 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
             lead = words[k - 4 : k]
             avoids = {*_lists()["avoiding"]} & {*lead} and not numbers_in(" ".join(lead))
             sided = lead[-1] == "of" and lead[-2] in _lists()["sides"]
-            if (
-                words[k] in _lists()["determiners"]
-                and lead[-1] in _lists()["avoided_by"]
-                and (avoids or sided)
-            ):
+            before = {*words[max(k - 5, 0) : k]}
+            bounded = lead[-1] == "to" and not before.isdisjoint(("closer", "nearer"))
+            led = lead[-1] in _lists()["avoided_by"] and (avoids or sided)
+            if words[k] in _lists()["determiners"] and (led or bounded):
                 stop = next((n for n in range(k, end) if _ends_thing(words[n])), end)
                 if not {*_lists()["picture"]} & {*words[k:stop]}:
                     found[k:stop] = ["thing"] * (stop - k)
@@ -81,10 +81,12 @@ def trimmed(words: Sequence[str], labels: Sequence[str]) -> tuple[str, ...]:
 
 
 def _mark_beside(words: Sequence[str], found: list[str]) -> None:
-    """Label as a thing what follows a determiner behind "above", "below" and the like."""
+    """Label as a thing what follows a determiner behind "above", "corner of" and the like."""
     after = _lists()["after"]
     for k in range(1, len(words) - 1):
-        if words[k - 1] not in _lists()["beside"] or words[k] not in _lists()["determiners"]:
+        led = words[k - 1] in _lists()["beside"]
+        led |= words[k - 1] == "of" and words[max(k - 2, 0)] in _lists()["parts"]
+        if not led or words[k] not in _lists()["determiners"]:
             continue
         rest = range(k + 1, len(words))
         stop = next((n for n in rest if _ends_thing(words[n]) or words[n] in after), len(words))

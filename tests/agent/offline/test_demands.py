@@ -186,3 +186,35 @@ def test_items_are_the_instruction_in_order() -> None:
 def test_a_one_in_place_of_a_noun_counts_no_robots(words: str, thing: str, robots: int) -> None:
     reading = read_instruction(words)
     assert ([*reading.things], reading.robots, [*reading.unread]) == ([thing], robots, [])
+
+
+@pytest.mark.parametrize(
+    ("words", "group"),
+    [
+        ("8 guards around the king with their backs to him", {"heading": "away"}),
+        ("10 robots in a circle where each is 35 px from the next one", {"pitch": 35.0}),
+        ("11 robots around the coin, practically touching it", {"fit": "tight"}),
+        ("nobody closer than 45 px to the stove, ring of nine", {"clearance": [45.0, 100_000]}),
+    ],
+)
+def test_what_follows_a_thing_is_demanded(words: str, group: dict[str, Any]) -> None:
+    reading = read_instruction(words)
+    assert (reading.group, [*reading.unread]) == (group, [])
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "two robots per corner of the crate",
+        "8 in it or around it",
+        "put 8 robots around it or not",
+    ],
+)
+def test_several_per_corner_and_choices_are_asked_about(words: str) -> None:
+    reading = read_instruction(words)
+    assert reading.unread or reading.stops
+
+
+def test_a_couple_more_robots_on_the_other_side_are_counted() -> None:
+    reading = read_instruction("Half a dozen on the left of the bench and a couple on the right")
+    assert reading.shares == [("left", 6), ("right", 2)]
