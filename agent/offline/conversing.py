@@ -13,12 +13,13 @@ from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
 from .amending import repaired
 from .answering import arrived, heading_text, query_text, said_of_edit, said_of_undo, talk
-from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
+from .choosing import Step, calls_in, chosen_candidates, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup import Followup
 from .followup_answers import words_meant
 from .followup_things import UNNAMED, pointing_at
 from .followups import commands, read_followup
+from .options import agrees, declines
 from .pointed import shown_now, using_pointed
 from .sharing import shared
 from .standing import Standing

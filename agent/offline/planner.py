@@ -5,7 +5,7 @@ when the words do not settle what to do. It is not a language model and sees onl
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,13 +15,22 @@ from ..messages import Call, History, Message, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
 from .answering import arrived
-from .choosing import Step, agrees, calls_in, declines, located_reasons, prompts_of
+from .choosing import Step, calls_in, located_reasons, names_things, prompts_of
 from .conversing import conversed
-from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
+from .drafting import (
+    contract_of,
+    options_of,
+    place_of,
+    question_of,
+    things_needed,
+    which_things,
+    would_do,
+)
 from .escorting import following
 from .followup_places import with_places
 from .followup_things import stood_about
 from .meant import things_meant
+from .options import agrees, declines, option_at
 from .pointed import chosen_by_answer, labelled, narrowed
 from .reading import Reading
 from .restated import LEFT_OUT, Restated, is_question, restated
@@ -129,6 +138,8 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         back = [answer for _, answer in _answered(history)[-1:]]
         untold = NOTHING_YET if any(is_question(a, task.metres_per_pixel) for a in back) else ""
         asked: dict[str, Any] = {"question": f"{untold}{question or 'How many robots?'}"}
+        options = options_of(task, reading, question or "")
+        asked |= {"options": list(options)} if options else {}
         ids = _target_ids(task)
         if robots and ids and would_do(task, reading, robots):
             asked["contract"] = _in_unit(task, contract_of(reading, robots, ids, []))
@@ -233,14 +244,19 @@ def _restated_instruction(task: Task, history: History) -> Restated:
 
 
 def _answered(history: History) -> list[tuple[str, str]]:
-    """Return the questions that offered no candidates, each with the person's answer."""
-    asked = {c.id: c.arguments for c in calls_in(history) if not c.arguments.get("candidates")}
+    """Return the questions that offered no things, each with the answer or the option it chose."""
+    calls = [c for c in calls_in(history) if not (c.arguments.get("candidates") or names_things(c))]
+    asked = {c.id: c.arguments for c in calls}
     answers = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
-    return [
-        (str(asked[m.call_id]["question"]), spelled(m.text.strip()))
-        for m in answers
-        if m.call_id in asked
-    ]
+    answered = [(asked[m.call_id], m.text) for m in answers if m.call_id in asked]
+    return [(str(a["question"]), spelled(_settled(a, text))) for a, text in answered]
+
+
+def _settled(asked: Mapping[str, Any], answer: str) -> str:
+    """Return the option that an answer chooses by its number or rank, else the answer."""
+    options: Sequence[str] = asked.get("options", ())
+    at = option_at(answer, len(options))
+    return answer.strip() if at is None else options[at]
 
 
 def _number_answered(history: History) -> int | None:
