@@ -57,6 +57,20 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     return _with_background(followup, _Steps(task, standing, followup, messages, before).next())
 
 
+def told_beside(task: Task, words: str, messages: History, before: History) -> Reply | None:
+    """Return the next step of answering words that ask about the plan, None if they do not.
+
+    Args:
+        words: said while a question was open.
+        messages: what followed on them.
+    """
+    standing = _standing(task, before)
+    followup = read_followup(words, standing)
+    if followup.kind != "query" and (followup.kind != "talk" or followup.about == "already"):
+        return None
+    return _Steps(task, standing, followup, messages, before).next()
+
+
 def _with_background(followup: Followup, reply: Reply) -> Reply:
     """Return the reply; at the end of a turn it also quotes what was read as background."""
     if reply.calls or not followup.background:

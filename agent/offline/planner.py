@@ -15,6 +15,7 @@ from ..messages import Call, History, Message, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
 from .answering import arrived
+from .besides import dropped, saying, without_besides
 from .choosing import Step, calls_in, located_reasons, names_things, prompts_of
 from .conversing import conversed
 from .drafting import (
@@ -33,14 +34,13 @@ from .meant import things_meant
 from .options import agrees, declines, option_at
 from .pointed import chosen_by_answer, labelled, narrowed
 from .reading import Reading
-from .restated import LEFT_OUT, Restated, is_question, restated
+from .restated import LEFT_OUT, Restated, restated
 from .sequences import in_stages, stages_of
 from .several import about_several
 from .spelling import spelled
 from .standing import Standing
 
 MAX_LABEL = 100
-NOTHING_YET = "Nothing stands yet, so there is nothing to tell of it. "
 ONE_AT_A_TIME = (
     "Those are formations one after the other, each from where robots arrived in the one before: "
     "only one can be planned without moving robots. Say that one alone."
@@ -59,7 +59,13 @@ class OfflinePlanner:
     async def reply(self, request: Request) -> Reply:
         """Return the next step of a conversation that began with a task message."""
         turn = tuple(turn_of(request.messages))
-        reply = _next_step(turn, request.messages[: -len(turn)])
+        before = request.messages[: -len(turn)]
+        left = without_besides(turn, before)
+        if isinstance(left, Reply):
+            reply = left
+        else:
+            told = dropped(turn, before) or left[1]
+            reply = saying(told, _next_step(left[0], before))
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
         calls = tuple(c.model_copy(update={"id": f"call-{number}"}) for c in reply.calls)
         return reply.model_copy(update={"calls": calls})
@@ -135,9 +141,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if not task.deploy and len(stages_of(replace(task, deploy=True))) > 1:
         question = ONE_AT_A_TIME
     if question or robots is None:
-        back = [answer for _, answer in _answered(history)[-1:]]
-        untold = NOTHING_YET if any(is_question(a, task.metres_per_pixel) for a in back) else ""
-        asked: dict[str, Any] = {"question": f"{untold}{question or 'How many robots?'}"}
+        asked: dict[str, Any] = {"question": question or "How many robots?"}
         options = options_of(task, reading, question or "")
         asked |= {"options": list(options)} if options else {}
         ids = _target_ids(task)
