@@ -99,7 +99,7 @@ def picked(answer: str, offered: Sequence[dict[str, Any]]) -> list[str]:
     at = option_named(answer, [str(c.get("label", "")) for c in offered]) if at is None else at
     if at is not None:
         return [str(offered[at]["id"])]
-    words = [w for w in re.findall(r"[a-z']+", answer) if w not in SMALL]
+    words = [w for w in re.findall(r"[a-z0-9']+", answer) if w not in SMALL]
     if len(words) != 1 or words[0] not in EXTREMES or not offered:
         return []
     measure, sign = EXTREMES[words[0]]

@@ -97,3 +97,12 @@ def test_an_option_is_chosen_by_what_only_it_says() -> None:
     assert option_chosen("to the left", options) is None
     assert option_chosen("the second one, please", options) == options[1]
     assert option_chosen("", options) is None
+
+
+def test_a_number_of_robots_and_a_side_choose_no_candidate(picture: Picture) -> None:
+    session = Agent().start(picture)
+    plan = session.say("surround the red thing with 5 robots").report.plan_id
+    assert session.say("put 2 over there").report.candidates
+    again = session.say("2 to the left").report
+    assert (again.status, again.plan_id) == ("question", plan)
+    assert session.say("the left one").report.targets[-1]["box"][:2] == pytest.approx(GREEN, abs=3)
