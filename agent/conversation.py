@@ -21,7 +21,7 @@ from .first_message import standing
 from .model import Model
 from .offline.followups import read_followup
 from .offline.standing import Standing
-from .open_question import check_settled
+from .open_question import calls_off, check_settled, drops, whole_instruction
 from .outcomes import Paused
 from .session import Run, SayOptions, Show
 from .store.protocol import StoredSession
@@ -40,19 +40,11 @@ STOP = re.compile(
     r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
 )
 """A sentence that holds the robots at once, before any model reads it."""
-CALLED_OFF = re.compile(
-    r"\W*(?:(?:oh|ok|okay|no|well|ah|actually|please|then|just)\b\W*)*"
-    r"(?:cancel|never ?mind|forget)(?: (?:about )?(?:it|that|this|the question))?"
-    r"(?:\W+(?:please|then|thanks|thank you))*\W*"
-)
-"""A sentence that drops an open question; it takes back a change only right after it was made."""
 STOP_DRIVING = re.compile(r"\b(?:stop+|halt|freeze|hold|wait|abort|cancel|don'?t|whoa|enough)\b")
 """Words that hold driving robots if the sentence is short: one stop too many costs little."""
 SHORT = 8
 """Most words of a short sentence."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
-DROPS = frozenset({"query", "talk", "undo", "hold", "go"})
-"""Kinds of follow-ups that do not answer an open question but drop it."""
 
 
 class TurnTaker(Protocol):
@@ -123,18 +115,20 @@ class Session:
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
         keep = options.get("keep_out", ())
         run, said = self.run, words
-        if run is not None and CALLED_OFF.fullmatch(words.lower()):
-            if isinstance(run.outcome, Paused):
-                return await self.aact(words, text=DROPPED, show=show)
-            if run.world.current == run.began.current:
-                return await self.aact(words, text=UNCHANGED, show=show)
         if run is not None and isinstance(run.outcome, Paused):
             shown, kind = (*pointed, *keep), read_followup(words, self._standing(run)).kind
+            if calls_off(words, undoing=kind != "undo"):
+                return await self.aact(words, text=DROPPED, show=show)
             check_settled(run.outcome, kind)
-            if not shown and kind not in DROPS:
+            fresh = whole_instruction(words, run.world.metres_per_pixel, kind)
+            if not (shown or fresh or drops(run.outcome, kind)):
                 return self._keep(await self._answered(run, words, show))
             if shown:  # the answer is something pointed at
                 words = f"{run.report.instruction} {words}".strip()
+            elif fresh:
+                words = said = fresh
+        elif run is not None and calls_off(words) and run.world.current == run.began.current:
+            return await self.aact(words, text=UNCHANGED, show=show)
         settings = await self._for_turn(words)
         if run is not None and words != said:  # the same instruction: its numbers still hold
             once = {name: getattr(run.context.settings, name) for name in ("robots", "starts")}

@@ -16,7 +16,9 @@ from ...tools.perception.referring.query import SINGLE
 from ..first_message import read_task
 from ..messages import Call, History, Reply, Result, User
 from .descriptions import Reference
+from .options import AGREEING, NUMBERING, SMALL, numbered, option_chosen, picked
 from .phrases import table
+from .references import described
 
 CROWDED, FAINT = 20, 0.6
 """With more things than this, or fainter ones, they are likelier patches than what people mean."""
@@ -71,8 +73,7 @@ def find(
     if before != now:
         return found  # the last answer chose one, and this is about the next
     answer = "".join(m.text for m in history[answered : answered + 1])
-    quoted = shorten(answer, MOST_QUOTED, placeholder=" ...")
-    question = f'"{quoted}" chooses none of them. {found.arguments["question"]}'
+    question = f"{_in_quotes(answer)} chooses none of them. {found.arguments['question']}"
     return Step(found.name, found.arguments | {"question": question})
 
 
@@ -85,8 +86,10 @@ def _find(
     if needed == 2 and len(things) == 1 and things[0].plural and not chosen:
         return _pair(things[0], history)
     if len(things) > needed:
-        named = " or ".join(f'"{t.wording}"' for t in things)
-        return _ask_all(f"Which thing is the arrangement about: {named}?", history)
+        one = _alternative(things, needed, history)
+        if isinstance(one, Step):
+            return one
+        things = [one]
     found: list[Found] = []
     for thing in things:
         one = _choose_one(thing, history)
@@ -103,6 +106,39 @@ def _find(
     spoken = " or ".join(f'"{t.wording}"' for t in things)
     named = f"By {spoken} none can be found" if spoken else "The words name none that can be found"
     return _ask_all(f"{which} {named} by its look.", history)
+
+
+def _alternative(things: Sequence[Reference], needed: int, history: History) -> Reference | Step:
+    """Return the one of more things than are needed that is meant, or the question which it is.
+
+    An answer may also describe another thing.
+    """
+    options, unclear = [t.wording for t in things], ""
+    if needed > 1:
+        named = ", ".join(f'"{wording}"' for wording in options)
+        return _ask_all(f"Which two things is the arrangement about, of {named}?", history)
+    for call in calls_in(history):
+        if list(call.arguments.get("options", ())) == options:
+            answer = next((m.text for m in history if _answers(m, call)), "")
+            if (chosen := option_chosen(answer, options)) is not None:
+                return things[options.index(chosen)]
+            others = [t for t in described([answer]) if t.noun and t.query]
+            others = [t for t in others if not (t.unknown or t.refused)]
+            if len(others) == 1:
+                return others[0]
+            unclear = f"{_in_quotes(answer)} is none of them. " if answer else ""
+    question = numbered(f"{unclear}Which thing is the arrangement about?", options)
+    return Step("ask_user", {"question": question, "options": options})
+
+
+def names_things(call: Call) -> bool:
+    """Return whether a question's alternatives are words for things, as in `_alternative`."""
+    options = call.arguments.get("options") or [""]
+    return all(str(o).split(" ", 1)[0] in table()["determiners"] for o in options)
+
+
+def _in_quotes(answer: str) -> str:
+    return f'"{shorten(answer, MOST_QUOTED, placeholder=" ...")}"'
 
 
 def chosen_candidates(history: History, needed: int) -> list[str]:
@@ -126,68 +162,6 @@ def chosen_candidates(history: History, needed: int) -> list[str]:
             if len(named) <= needed and not _excludes(answer):
                 chosen = named
     return chosen
-
-
-AGREEING = {"yes", "yep", "yeah", "ok", "okay", "sure", "right", "correct", "exactly", "go", "do"}
-SMALL = {"the", "one", "on", "at", "in", "of", "to", "them", "it", "please", "i", "mean", "is"} | {
-    "that", "a", "most", "and", "two", "ahead", "then"
-}  # fmt: skip
-NUMBERING = {"number", "numbers", "no", "nr", "num", "candidate", "option", "choice", "thing"} | {
-    "meant", "take", "pick", "choose", "think", "would", "say", "be", "was", "for", "with", "thanks"
-}  # fmt: skip
-ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
-EXTREMES: dict[str, tuple[str, int]] = {
-    **dict.fromkeys(("left", "leftmost", "western"), ("x", -1)),
-    **dict.fromkeys(("right", "rightmost", "eastern"), ("x", 1)),
-    **dict.fromkeys(("top", "upper", "topmost", "above", "highest", "northern"), ("y", -1)),
-    **dict.fromkeys(("bottom", "lower", "lowest", "below", "southern"), ("y", 1)),
-    **dict.fromkeys(("big", "bigger", "biggest", "large", "larger", "largest"), ("area", 1)),
-    **dict.fromkeys(("small", "smaller", "smallest", "little", "littlest"), ("area", -1)),
-}
-"""Words of an answer that choose by place or size: a measure, and 1 for most or -1 for least."""
-
-
-DECLINED = ("no", "nope", "nothing", "none", "no thanks", "never mind", "leave it")
-
-
-def declines(answer: str) -> bool:
-    """Return whether an answer is a plain no."""
-    return answer.lower().strip(" .!") in DECLINED
-
-
-def agrees(answer: str) -> bool:
-    """Return whether an answer is a plain yes."""
-    words = re.findall(r"[a-z']+", answer.lower())
-    return bool(words) and set(words) <= AGREEING | SMALL and bool(set(words) & AGREEING)
-
-
-def picked(answer: str, offered: Sequence[dict[str, Any]]) -> list[str]:
-    """Return the candidate that "the left one" or "the second" chooses, as a list; empty if none.
-
-    Args:
-        answer: in lower case.
-        offered: the candidates as locate_object gave them, in the order of the question.
-    """
-    words = [w for w in re.findall(r"[a-z']+", answer) if w not in SMALL]
-    if len(offered) == 1 and agrees(answer):
-        return [str(offered[0]["id"])]
-    if len(words) != 1 or not offered:
-        return []
-    word = words[0]
-    if word in ORDINALS and ORDINALS.index(word) < len(offered):
-        return [str(offered[ORDINALS.index(word)]["id"])]
-    if word == "last":
-        return [str(offered[-1]["id"])]
-    if word not in EXTREMES:
-        return []
-    measure, sign = EXTREMES[word]
-    ranked = sorted(offered, key=lambda c: -sign * _measure(c, measure))
-    return [str(ranked[0]["id"])]
-
-
-def _measure(candidate: dict[str, Any], name: str) -> float:
-    x0, y0, x1, y1 = candidate["box"]
-    return {"x": x0 + x1, "y": y0 + y1}.get(name, candidate["area_px"])
 
 
 def sightings(ids: Sequence[str], history: History) -> list[dict[str, Any]]:

@@ -13,12 +13,13 @@ from ..first_message import Task, read_task
 from ..messages import Call, History, Reply, Result, User
 from .amending import repaired
 from .answering import arrived, heading_text, query_text, said_of_edit, said_of_undo, talk
-from .choosing import Step, agrees, calls_in, chosen_candidates, declines, prompts_of
+from .choosing import Step, calls_in, chosen_candidates, prompts_of
 from .finding import found_thing, known_thing, measured_at
 from .followup import Followup
 from .followup_answers import words_meant
 from .followup_things import UNNAMED, pointing_at
 from .followups import commands, read_followup
+from .options import agrees, declines
 from .pointed import shown_now, using_pointed
 from .sharing import shared
 from .standing import Standing
@@ -54,6 +55,20 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
         said = followup.text if standing else words
         return replace(task, instruction=repaired(said)), (turn[0], *messages) if fresh else turn
     return _with_background(followup, _Steps(task, standing, followup, messages, before).next())
+
+
+def told_beside(task: Task, words: str, messages: History, before: History) -> Reply | None:
+    """Return the next step of answering words that ask about the plan, None if they do not.
+
+    Args:
+        words: said while a question was open.
+        messages: what followed on them.
+    """
+    standing = _standing(task, before)
+    followup = read_followup(words, standing)
+    if followup.kind != "query" and (followup.kind != "talk" or followup.about == "already"):
+        return None
+    return _Steps(task, standing, followup, messages, before).next()
 
 
 def _with_background(followup: Followup, reply: Reply) -> Reply:

@@ -6,6 +6,7 @@ from typing import Any
 from ...tools.formation.contract import MAX_ROBOTS
 from ..first_message import Task
 from .drawn_forms import BESIDE, ENCLOSING, SIDES
+from .options import numbered
 from .reading import Reading, unscaled
 
 EXAMPLES = "around it, at its corners, along its left side, inside it, between two things, or caged"
@@ -37,6 +38,14 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
         or (None if task.robots else _too_few(reading, robots))
         or which_things(task, reading)
     )
+
+
+def options_of(task: Task, reading: Reading, question: str) -> tuple[str, ...]:
+    """Return the alternatives that a question of `question_of` names, in its order."""
+    if question == which_things(task, reading):
+        ids = tuple(_pointed(task))
+        return ids if len(ids) > 1 else ()
+    return _arrangements(reading) if question == _unsettled(reading) else ()
 
 
 def would_do(task: Task, reading: Reading, robots: int) -> bool:
@@ -186,8 +195,7 @@ def _unsettled(reading: Reading) -> str | None:
             f"robots, for example {EXAMPLES}."
         )
     if not reading.sure:
-        likely = [m for m, _ in reading.meanings if m in NAMES][:2]
-        return f"Which arrangement is meant: {' or '.join(NAMES[m] for m in likely)}?"
+        return numbered("Which arrangement is meant?", _arrangements(reading))
     if relation == "shape" and reading.form is None:
         return "Which form should the robots draw? For example a V, an arc, a star or the letter A."
     if relation == "shape" and reading.form and place_of(reading, 0) is None:
@@ -197,6 +205,12 @@ def _unsettled(reading: Reading) -> str | None:
             "left, right, above or below."
         )
     return "The offline rules place two rings or rows at most." if reading.rings > 2 else None
+
+
+def _arrangements(reading: Reading) -> tuple[str, ...]:
+    """Return the likeliest arrangements of words that settle none."""
+    likely = [NAMES[m] for m, _ in reading.meanings if m in NAMES][:2]
+    return () if reading.sure else tuple(likely)
 
 
 def _how_many(reading: Reading, robots: int | None) -> str | None:
@@ -220,7 +234,7 @@ def _too_few(reading: Reading, robots: int | None) -> str | None:
 
 def which_things(task: Task, reading: Reading) -> str | None:
     """Return what to ask if the number of things pointed at does not fit; None if it does."""
-    pointed = list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))
+    pointed = _pointed(task)
     needed = things_needed(reading)
     if reading.others and len(pointed) == needed + len(reading.others):
         return None
@@ -235,3 +249,7 @@ def which_things(task: Task, reading: Reading) -> str | None:
             "Which?"
         )
     return None
+
+
+def _pointed(task: Task) -> list[str]:
+    return list(dict.fromkeys([*task.targets, *(p["id"] for p in task.pointed)]))

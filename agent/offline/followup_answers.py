@@ -6,9 +6,9 @@ It may choose an option, fill in what was left open, or be a command of its own.
 import re
 from collections.abc import Sequence
 
-from .choosing import agrees
 from .followup import Followup
 from .followups import commands, read_followup
+from .options import agrees, option_at, option_named
 from .standing import Standing
 
 DEICTIC = re.compile(
@@ -45,10 +45,9 @@ def words_meant(words: str, followup: Followup, answer: str, standing: Standing 
     if standing and commands(answer, standing):
         return answer
     answer = BESIDES.sub("", answer) or answer
-    said = set(re.findall(r"\w+", answer.lower()))
-    fitting = [option for option in followup.options if said <= {*option.lower().split()}]
-    if len(fitting) == 1:
-        return fitting[0]
+    named = option_named(answer, followup.options)
+    if named is not None:
+        return followup.options[named]
     for attempt in (*_filled_in(words, answer), f"{words} {answer}", f"{answer} {words}"):
         if read_followup(attempt, standing).kind not in ("ask", "refuse", "instruction"):
             return attempt
@@ -56,12 +55,10 @@ def words_meant(words: str, followup: Followup, answer: str, standing: Standing 
 
 
 def _chosen(answer: str, options: Sequence[str]) -> str | None:
-    """Return the option chosen by number, by its words, or by yes to the only one."""
-    number = re.fullmatch(r"\W*(?:option |number )?([0-9]+)\W*", answer.lower())
-    if number and 1 <= int(number[1]) <= len(options):
-        return options[int(number[1]) - 1]
-    if len(options) == 1 and agrees(answer):
-        return options[0]
+    """Return the option chosen by number, by rank, in full, or by yes to the only one."""
+    at = option_at(answer, len(options))
+    if at is not None or (len(options) == 1 and agrees(answer)):
+        return options[at or 0]
     return answer if answer in options else None
 
 

@@ -5,7 +5,7 @@ when the words do not settle what to do. It is not a language model and sees onl
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,23 +15,32 @@ from ..messages import Call, History, Message, Reply, Result, User, turn_of
 from ..model import Request
 from .accounting import read_instruction
 from .answering import arrived
-from .choosing import Step, agrees, calls_in, declines, located_reasons, prompts_of
+from .besides import dropped, saying, without_besides
+from .choosing import Step, calls_in, located_reasons, names_things, prompts_of
 from .conversing import conversed
-from .drafting import contract_of, place_of, question_of, things_needed, which_things, would_do
+from .drafting import (
+    contract_of,
+    options_of,
+    place_of,
+    question_of,
+    things_needed,
+    which_things,
+    would_do,
+)
 from .escorting import following
 from .followup_places import with_places
 from .followup_things import stood_about
 from .meant import things_meant
+from .options import agrees, declines, option_at
 from .pointed import chosen_by_answer, labelled, narrowed
 from .reading import Reading
-from .restated import LEFT_OUT, Restated, is_question, restated
+from .restated import LEFT_OUT, Restated, restated
 from .sequences import in_stages, stages_of
 from .several import about_several
 from .spelling import spelled
 from .standing import Standing
 
 MAX_LABEL = 100
-NOTHING_YET = "Nothing stands yet, so there is nothing to tell of it. "
 ONE_AT_A_TIME = (
     "Those are formations one after the other, each from where robots arrived in the one before: "
     "only one can be planned without moving robots. Say that one alone."
@@ -50,7 +59,13 @@ class OfflinePlanner:
     async def reply(self, request: Request) -> Reply:
         """Return the next step of a conversation that began with a task message."""
         turn = tuple(turn_of(request.messages))
-        reply = _next_step(turn, request.messages[: -len(turn)])
+        before = request.messages[: -len(turn)]
+        left = without_besides(turn, before)
+        if isinstance(left, Reply):
+            reply = left
+        else:
+            told = dropped(turn, before) or left[1]
+            reply = saying(told, _next_step(left[0], before))
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
         calls = tuple(c.model_copy(update={"id": f"call-{number}"}) for c in reply.calls)
         return reply.model_copy(update={"calls": calls})
@@ -126,9 +141,9 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if not task.deploy and len(stages_of(replace(task, deploy=True))) > 1:
         question = ONE_AT_A_TIME
     if question or robots is None:
-        back = [answer for _, answer in _answered(history)[-1:]]
-        untold = NOTHING_YET if any(is_question(a, task.metres_per_pixel) for a in back) else ""
-        asked: dict[str, Any] = {"question": f"{untold}{question or 'How many robots?'}"}
+        asked: dict[str, Any] = {"question": question or "How many robots?"}
+        options = options_of(task, reading, question or "")
+        asked |= {"options": list(options)} if options else {}
         ids = _target_ids(task)
         if robots and ids and would_do(task, reading, robots):
             asked["contract"] = _in_unit(task, contract_of(reading, robots, ids, []))
@@ -233,14 +248,19 @@ def _restated_instruction(task: Task, history: History) -> Restated:
 
 
 def _answered(history: History) -> list[tuple[str, str]]:
-    """Return the questions that offered no candidates, each with the person's answer."""
-    asked = {c.id: c.arguments for c in calls_in(history) if not c.arguments.get("candidates")}
+    """Return the questions that offered no things, each with the answer or the option it chose."""
+    calls = [c for c in calls_in(history) if not (c.arguments.get("candidates") or names_things(c))]
+    asked = {c.id: c.arguments for c in calls}
     answers = [m for m in history if isinstance(m, Result) and m.name == "ask_user"]
-    return [
-        (str(asked[m.call_id]["question"]), spelled(m.text.strip()))
-        for m in answers
-        if m.call_id in asked
-    ]
+    answered = [(asked[m.call_id], m.text) for m in answers if m.call_id in asked]
+    return [(str(a["question"]), spelled(_settled(a, text))) for a, text in answered]
+
+
+def _settled(asked: Mapping[str, Any], answer: str) -> str:
+    """Return the option that an answer chooses by its number or rank, else the answer."""
+    options: Sequence[str] = asked.get("options", ())
+    at = option_at(answer, len(options))
+    return answer.strip() if at is None else options[at]
 
 
 def _number_answered(history: History) -> int | None:

@@ -1,7 +1,8 @@
 """The question asked where robots with assigned places find no order in which to move."""
 
 from ..messages import History, Result
-from .choosing import Step, agrees, calls_in, declines
+from .choosing import Step, calls_in
+from .options import agrees, declines
 
 MAY_SHARE = "Shall the robots share the places among themselves? 1: yes; 2: no."
 

@@ -131,14 +131,6 @@ def test_a_fork_leaves_the_other_as_it_was(session: Session) -> None:
     assert session.say("turn it 20 degrees").report.parent == changed.report.parent
 
 
-def test_a_question_is_dropped_for_what_is_no_answer_to_it(session: Session) -> None:
-    asked = session.say("move the flurb")
-    assert asked.report.status == "question"
-    told = session.say("how far is robot 4?")
-    assert told.report.status == "answered"
-    assert told.report.plan_id == asked.report.plan_id
-
-
 @pytest.mark.parametrize("words", ["cancel", "Never mind.", "oh forget it", "ok, cancel that"])
 def test_what_calls_off_a_question_changes_nothing(
     session: Session, picture: Picture, words: str
