@@ -20,7 +20,7 @@ def described(phrases: Sequence[str]) -> tuple[Reference, ...]:
     for phrase_ in phrases:
         words = _split_words(phrase_)
         if words and words[0] not in table()["determiners"]:
-            words = ["the", *words]
+            words = ["the", *words[words[0] in ("a", "an") :]]
         found += _described_all(words)
     return _without_repeats(found)
 

@@ -172,3 +172,9 @@ def test_any_words_are_read_without_a_crash(words: str) -> None:
     if reading.unread or reading.stops:
         assert question_of(task, reading, reading.robots)
     assert all(thing.wording for thing in described(reading.things))
+
+
+@pytest.mark.parametrize("phrase", ["a red coin", "red coin", "the red coin"])
+def test_a_phrase_names_its_thing_with_any_article(phrase: str) -> None:
+    (thing,) = described([phrase])
+    assert (thing.query, thing.noun) == ({"colours": ["red"]}, "circle")
