@@ -84,6 +84,8 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
             turns[-1].append(event.data["changes"])
         elif event.kind == "message":
             lines.append(event.data)
+        elif event.kind == "end":
+            approved = None  # what went on after an approval is over: the next drive needs another
         end = event.data if event.kind == "end" else end
         end = None if event.kind in GOES_ON else end
     if not said.get("words"):

@@ -5,9 +5,10 @@ from typing import Any
 
 import pytest
 from formup.agent.agent import Agent
+from formup.agent.limits import Limits
 from formup.agent.messages import Call, Reply, turn_of
 from formup.agent.model import Request
-from formup.agent.outcomes import Answered, Cancelled, Paused
+from formup.agent.outcomes import Answered, Cancelled, Paused, Stopped
 from formup.agent.policy import Policy
 from formup.agent.session import Run, load_run
 from formup.agent.store.folder import read_events
@@ -95,6 +96,24 @@ def test_an_approval_is_not_for_the_next_plan(
     assert third.report.status == "deployed"
     assert list(third.world.arrivals) == [one, other.plan_id]
     assert len(drives) > driven
+
+
+@pytest.mark.usefixtures("real")
+def test_a_run_that_ended_after_its_drive_needs_another_approval_to_drive_on(
+    red_box: Picture, propose: Call, drives: list[Any], tmp_path: Path
+) -> None:
+    def agent(*replies: Reply, requests: int = 20) -> Agent:
+        return Agent(ScriptedModel(replies), limits=Limits(requests=requests))
+
+    trace = tmp_path / "trace.jsonl"
+    asked = agent(Reply(calls=(propose, deploy("d")))).run(red_box, "Surround it", trace=trace)
+    ended = agent(requests=1).resume(load_run(tmp_path), approve=True)
+    assert isinstance(ended.outcome, Stopped)
+    driven = len(drives)
+    assert driven
+    again = Reply(calls=(deploy("d2", plan_id=paused(asked).plan_id),))
+    assert paused(agent(again).resume(load_run(tmp_path))).call.id == "d2"
+    assert len(drives) == driven
 
 
 @pytest.mark.usefixtures("real")
