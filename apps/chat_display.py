@@ -81,6 +81,8 @@ class Display:
             self._console.print(styled((head, STATUS_STYLE[report.status]), rest))
         for choice in report.candidates or ():
             self.line("choice", choice_words(choice))
+        if report.candidates:
+            self.line("or", "/point X,Y, the thing's place in the picture")
         if shown.changed and report.verdict is not None:
             for name, text in certificate_lines(report):
                 self.line(name, text)

@@ -113,6 +113,12 @@ def test_a_point_answers_or_goes_with_what_is_said_next(chat: Chat) -> None:
     assert made[1]["targets"][-1]["box"] == pytest.approx([x0, y0, x1, y1], abs=3)
 
 
+def test_a_person_is_told_how_to_show_the_thing_that_is_meant(chat: Chat) -> None:
+    done = chat(["Surround the thing with 6 robots"], "scene.png")
+    assert done.stdout.count("\nchoice: ") == 2
+    assert "or: /point X,Y, the thing's place in the picture\n" in done.stdout
+
+
 def test_things_are_numbered_in_the_order_given(chat: Chat) -> None:
     options = ["--box", "235,115,305,175", "--point", "90,65", "--json"]
     made = objects(chat(["Put 3 robots between them"], "scene.png", *options))[0]
