@@ -7,6 +7,7 @@ import shapely
 
 from ..context import Context
 from ..errors import InputError, ToolError
+from ..fleet.protocol import Pose
 from ..formation.contract import Contract
 from ..geometry.outline import MIN_AREA, Outline, outline_of
 from ..perception.target_prompt import TargetPrompt
@@ -17,6 +18,10 @@ FAINT = 0.4
 """Candidates that are less salient do not count as things."""
 SPECK, GROUND = 2e-4, 0.33
 """What covers less of the picture may be dirt; what covers more is the ground."""
+LOOKS_LARGER, WITHIN = 1.6, 0.9
+"""Times its radius up to which a robot's own look is taken to reach, and the share of a thing that
+has to lie within.
+"""
 DETAIL, DECIMALS = 1.0, 1
 """How much the outlines of other things are simplified, px, and decimals they are rounded to."""
 
@@ -35,6 +40,24 @@ def with_others(context: Context) -> World:
             thing = {"id": c.id, "reason": c.label, "hard": False, "confidence": seen}
             found.append(KeepOut.model_validate({"outline": outline, **thing}))
     return world.having(keep_out=(*world.keep_out, *found))
+
+
+def without_robots(world: World, poses: Sequence[Pose], radius: float) -> World:
+    """Return the world without things that are its own robots, as a picture from above shows them.
+
+    Such a thing lies almost whole within some robot's body, which may look larger by its shadow.
+
+    Args:
+        radius: of a robot, px.
+    """
+    bodies = shapely.points([(pose.x, pose.y) for pose in poses]).tolist()
+    team = shapely.union_all([body.buffer(LOOKS_LARGER * radius) for body in bodies])
+    kept = [
+        k
+        for k in world.keep_out
+        if k.hard or k.outline.filled.intersection(team).area < WITHIN * k.outline.filled.area
+    ]
+    return world.having(keep_out=tuple(kept)) if len(kept) < len(world.keep_out) else world
 
 
 def with_keep_outs(context: Context, prompts: Sequence[TargetPrompt]) -> World:

@@ -36,6 +36,7 @@ from ..tool import in_thread
 from ..world import PlanNode, World
 from .follows import followed, stands_about, watch_target
 from .motions import Going, going, met_by, remember_ways
+from .others import without_robots
 from .tracks import with_track
 
 MOST_NAMED = 12
@@ -77,6 +78,8 @@ async def with_robots(
         return world.with_plan(_noted(world, node, told, None))
     check_turns(plan, fleet)
     poses = await fleet.observe(max_age=MAX_AGE)
+    if fleet.real:
+        world = without_robots(world, poses, fleet.radius)
     found: Going = await in_thread(lambda: going(world, plan, fleet, poses, taking, share))
     plan = plan.for_robots(found.robots, [pose.id for pose in poses])
     node = node.model_copy(update={"plan": plan, "motion": found.verdict})

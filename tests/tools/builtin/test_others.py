@@ -13,6 +13,7 @@ from formup.tools.builtin.others import with_keep_outs, with_others
 from formup.tools.builtin.tracks import read_track
 from formup.tools.context import Context, Services, Settings
 from formup.tools.errors import InputError, ToolError
+from formup.tools.fleet.simulated import SimulatedFleet
 from formup.tools.formation.contract import Contract, Group
 from formup.tools.perception.detectors.candidates import StandoutDetector
 from formup.tools.perception.image import Picture, picture_from_array
@@ -244,3 +245,16 @@ def test_keeping_out_of_what_is_to_be_stood_on_is_refused(
         with pytest.raises(ToolError, match="t1, which keep_out forbids"):
             propose(work, one, keep_out=("t1",))
     assert propose(work, group("around", 5), keep_out=("t1",))["certified"]
+
+
+def test_real_robots_that_the_picture_shows_are_none_of_its_things(
+    tool_calls: Begin, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts = ((40.0, 40.0), (500.0, 40.0), (350.0, 350.0))
+    boxes = [(x - 9, y - 9, x + 9, y + 9) for x, y in np.array(starts[:2], dtype=int).tolist()]
+    seen = picture(*boxes, (300, 330, 400, 370))
+    for real, things in ((False, 4), (True, 2)):  # the target and a box beside them
+        monkeypatch.setattr(SimulatedFleet, "real", real)
+        work = tool_calls(seen, starts=starts)
+        propose(work, group("around", 3), robot_radius=10)
+        assert len([k for k in work.world.keep_out if not k.hard]) == things, real
