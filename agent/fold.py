@@ -66,7 +66,7 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     start = World.model_validate({"picture": facts["picture"]["facts"]})
     turns: list[list[Mapping[str, Any]]] = []
     said: Mapping[str, Any] = {}
-    approved = end = None
+    end = None
     lines: list[Mapping[str, Any]] = []
     seconds = last = 0.0
     for event in _begun(events[1:]):
@@ -74,24 +74,21 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
             seconds = 0.0 if event.kind == "turn" else seconds + last
         last = event.seconds
         if event.kind == "turn":
-            said, approved = event.data, None
+            said = event.data
             turns.append([])
         elif event.kind == "picture":
             facts = {**facts, "picture": event.data}
-        elif event.kind == "approval" and event.data["plan_id"]:
-            approved = event.data["plan_id"]
         elif event.kind == "world":
             turns[-1].append(event.data["changes"])
         elif event.kind == "message":
             lines.append(event.data)
-        elif event.kind == "end":
-            approved = None  # what went on after an approval is over: the next drive needs another
         end = event.data if event.kind == "end" else end
         end = None if event.kind in GOES_ON else end
     if not said.get("words"):
         raise InputError("It was broken off before anything began; run again.")
     settings = Settings.model_validate(said["settings"])
-    settings = settings.model_copy(update={"approved": approved}) if approved else settings
+    if approved := _approved(events):
+        settings = settings.model_copy(update={"approved": approved})
     began, steps = _steps_before(start, turns)
     world = with_changes(began, *turns[-1])
     latest = [name for name in (world.current, *list(world.plans)[-1:]) if name]
@@ -100,6 +97,17 @@ def fold(events: Sequence[Event], artefacts: Artefacts) -> State:
     messages = paired(read_messages(lines, artefacts))
     words, spent, since = said["words"], seconds + last, _since(events)
     return State(facts, settings, words, world, began, steps, messages, spent, end, since)
+
+
+def _approved(events: Sequence[Event]) -> str | None:
+    """Return the plan whose approval still counts: what goes on after an end needs another."""
+    approved: str | None = None
+    for event in events:
+        if event.kind in ("turn", "end"):
+            approved = None
+        elif event.kind == "approval":
+            approved = event.data["plan_id"] or approved
+    return approved
 
 
 def _steps_before(

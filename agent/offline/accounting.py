@@ -19,7 +19,7 @@ from .demands import (
     sentences,
     stops_in,
 )
-from .drawn_forms import form_in
+from .drawn_forms import CORNERED, form_in
 from .evidence import meaning_of, weighed
 from .languages import foreign_language
 from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
@@ -37,7 +37,7 @@ OF_OTHERS = frozenset(("keep_out", "faced", "left_alone", "rings_of"))
 """Demands that name a thing other than the one the arrangement is about."""
 LONGEST_CALL = 3
 """Most words of an exclamation that only addresses somebody: "Ball boys!"."""
-LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "square", "grid"))
+LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "grid", *CORNERED))
 """Forms robots may stand in; words that say "a" and one of these are never background."""
 RINGS = frozenset(("ring", "radius", "diameter"))
 """Demands that only a ring can meet."""

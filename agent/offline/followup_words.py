@@ -33,6 +33,7 @@ NUMBERED = re.compile(
 )
 ARTICLES = frozenset(("the", "a", "an"))
 NOT_PLACING = frozenset(("to", "of", "about", "each", "every"))
+WHO = frozenset(("team", "robots", "portion", "rest", "vague", "lone"))
 EACH, PART = ("one", "ones"), ("even", "odd")
 PRONOUNS = frozenset(("them", "it", "they", "us", "you"))
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
@@ -78,11 +79,13 @@ def chunks_of(text: str, standing: Standing) -> tuple[Chunk, ...]:
 def _in_context(chunks: Sequence[Chunk], standing: Standing) -> Iterator[Chunk]:
     """Drop kinds that a phrase cannot be where it stands.
 
-    "All around" is not "about"; "both" are teams only where there are two.
+    "All around" is not "about", and who waits corrects nothing; "both" are teams if there are two.
     """
     for k, chunk in enumerate(chunks):
         last = not chunks[k + 1 :] or not {"sep", "it"}.isdisjoint(chunks[k + 1].kinds)
         wrong = {"about"} if "relation" in chunk.kinds and last else set[str]()
+        who = chunks[k - 1].kinds if k else {}
+        wrong |= set() if WHO.isdisjoint(who) else {"correction"}
         wrong |= {"team"} if "each" in chunk.kinds and len(standing.groups) < 2 else set()
         yield replace(chunk, kinds={k: v for k, v in chunk.kinds.items() if k not in wrong})
 

@@ -218,3 +218,14 @@ def test_several_per_corner_and_choices_are_asked_about(words: str) -> None:
 def test_a_couple_more_robots_on_the_other_side_are_counted() -> None:
     reading = read_instruction("Half a dozen on the left of the bench and a couple on the right")
     assert reading.shares == [("left", 6), ("right", 2)]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "Three quarters of a circle with 9 robots, the missing quarter at lower left",
+        "Maybe a hexagon? Six robots, one per corner, 32 px from the thing.",
+    ],
+)
+def test_parts_of_a_ring_and_forms_in_passing_are_asked_about(words: str) -> None:
+    assert read_instruction(words).unread
