@@ -84,7 +84,7 @@ def _in_context(chunks: Sequence[Chunk], standing: Standing) -> Iterator[Chunk]:
     for k, chunk in enumerate(chunks):
         last = not chunks[k + 1 :] or not {"sep", "it"}.isdisjoint(chunks[k + 1].kinds)
         wrong = {"about"} if "relation" in chunk.kinds and last else set[str]()
-        who = chunks[k - 1].kinds if k else {}
+        who = {*chunks[k - 1].kinds} if k else set[str]()
         wrong |= set() if WHO.isdisjoint(who) else {"correction"}
         wrong |= {"team"} if "each" in chunk.kinds and len(standing.groups) < 2 else set()
         yield replace(chunk, kinds={k: v for k, v in chunk.kinds.items() if k not in wrong})
