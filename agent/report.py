@@ -317,16 +317,20 @@ def deployed_since(plan: Plan, arrival: Arrival | None, scale: float | None) -> 
 
 
 def still_true(node: PlanNode, arrival: Arrival | None) -> tuple[Verdict, MotionVerdict | None]:
-    """Return a plan's verdicts without what robots that were stopped on their way have voided.
+    """Return a plan's verdicts without what a drive has voided.
 
-    That is the motion, from where they stood, and what they meet on it and at its end.
+    Where robots were stopped, that is the motion, from where they stood, and what they meet on it
+    and at its end; where they arrived, that they had a long way to go.
     """
     verdict = node.plan.verdict
-    if arrival is None or arrival.arrived:
+    if arrival is None:
         return verdict, node.motion
-    met = notes_of(node.encounters)
-    notes = tuple(note for note in verdict.notes if note not in met)
-    return verdict.model_copy(update={"notes": notes}), None
+    void = notes_of(node.encounters)
+    if arrival.arrived:
+        void = [met.sentence for met in node.encounters if met.how == "round"]
+    notes = tuple(note for note in verdict.notes if note not in void)
+    motion = node.motion if arrival.arrived else None
+    return verdict.model_copy(update={"notes": notes}), motion
 
 
 def _last_words(outcome: Outcome) -> str:

@@ -19,7 +19,6 @@ from ...agent.outcomes import Cancelled, Paused
 from ...agent.report import Totals
 from ...agent.session import Run
 from ...agent.turns import Turn
-from ...tools.builtin.motions import ways_ahead
 from ...tools.draw import draw_plan
 from ...tools.errors import FormupError, InputError
 from ..run_display import choice_words
@@ -337,8 +336,7 @@ def _picture(run: Run) -> bytes | None:
     if report.candidates:
         drawn = draw_choices(run)
     elif node is not None and report.status in ("planned", "deployed", "needs_approval"):
-        ways, title = ways_ahead(run.context, run.world, node.plan), report.instruction
-        drawn = draw_plan(run.context.picture, run.world, node.plan, title, ways=ways)
+        drawn = draw_plan(run.context.picture, run.world, node.plan, report.instruction)
     else:
         return None
     drawn.save(file, "PNG")

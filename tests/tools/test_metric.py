@@ -205,12 +205,12 @@ def test_a_run_in_metres_is_reported_in_both_and_goes_on_in_another_process(
     assert load_run(trace).report.metric == metric
 
 
-def test_without_a_scale_metric_words_are_refused_with_the_option_named() -> None:
+def test_without_a_scale_metric_words_are_refused_with_what_would_do() -> None:
     words = "Ring the red thing with 6 robots, 1 m away"
     report = Agent().run(picture_from_array(pixels()), words).report
     assert report.status == "question"
     assert "1 m" in report.message
-    assert "--metres-per-pixel" in report.message
+    assert "Say it in px" in report.message and "metres per pixel" in report.message
     assert report.metric is None
 
 

@@ -86,6 +86,11 @@ class Simulated(Generic[Robots]):
     def was_told(self, what: str) -> bool:
         return any(what in text for text in self.told)
 
+    def named(self, what: str) -> set[str]:
+        """Robots of whom something was told, in one sentence or several."""
+        told = [text.rpartition(": ")[2].split(", ") for text in [*self.told] if what in text]
+        return {robot for robots in told for robot in robots}
+
     def end(self) -> None:
         self.done.set()
         if self._thread is not None:

@@ -180,9 +180,9 @@ def test_robots_hold_by_themselves_when_the_process_that_drives_them_is_killed(
 ) -> None:
     there = lab(drive_by=by).simulate()
     with driven(there.path) as driver:
-        wait_for(lambda: there.was_told("driving"))
+        wait_for(lambda: there.named("driving") == {"a", "b", "c"})
         driver.kill()
-    wait_for(lambda: there.was_told("no goal came for 0.5 s: held: a, b, c"))
+    wait_for(lambda: there.named("no goal came for 0.5 s: held") == {"a", "b", "c"})
     wait_for(lambda: stand(there))
     assert there.robots.points[:, 0].max() < 1000
 
