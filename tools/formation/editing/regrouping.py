@@ -3,7 +3,7 @@
 Frame: image pixels, x right, y down.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -39,6 +39,17 @@ EITHER = (
     ("sides", "opening_towards"),
 )
 """Alternatives: a group has only one field of each pair or triple."""
+TOLD_OF = {
+    "opening": "the opening",
+    "opening_towards": "the opening",
+    "sides": "the sides",
+    "max_gap": "the greatest gap",
+    "pitch": "the spacing",
+    "radius": "the radius",
+}
+"""Fields that another arrangement may not have, in words."""
+CLOSED_OFF = ("the opening", "the sides")
+"""What a cage is meant to have none of."""
 
 
 def without(draft: Draft, gone: IntArray, leave: Leave) -> Draft:
@@ -263,9 +274,27 @@ def arranged(draft: Draft, edit: Arrange) -> Draft:
         if all(part is not p for p in named):
             sets.get(part.group.targets, next(iter(sets.values()))).append(part)
     done = [p for p in draft.parts if all(p is not c for c in chosen)]
+    lost: dict[str, None] = {}
     for parts in sets.values():
         done.append(_gathered(parts, _rearranged(parts[0], demands), done))
-    return draft.with_parts(done)
+        lost |= dict.fromkeys(_given_up(parts[0], done[-1].group, demands))
+    told = [f"Not carried over to the new arrangement: {' and '.join(lost)}."] if lost else []
+    return replace(draft.with_parts(done), notes=(*draft.notes, *told))
+
+
+def _given_up(part: Part, group: Group, demands: dict[str, Any]) -> Iterator[str]:
+    """Yield what was demanded of a part beside its arrangement, and is not of its new group."""
+    before = part.group
+    if before.relation == group.relation:
+        return
+    closes = group.relation == "cage"
+    for name, words in TOLD_OF.items():
+        demanded = getattr(before, name) is not None and name not in demands
+        if demanded and getattr(group, name) is None and not (closes and words in CLOSED_OFF):
+            yield words
+    usual = has_default_clearance(before, part.site.outlines, part.site.room, part.radius)
+    if not usual and "clearance" not in demands and group.clearance != before.clearance:
+        yield "the distance"
 
 
 def _placeless(demands: dict[str, Any]) -> bool:

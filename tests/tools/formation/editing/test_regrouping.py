@@ -128,3 +128,26 @@ def test_more_robots_stand_around_another_thing_as_those_that_are_there() -> Non
     assert groups(joined) == [("around", ("t1",), 8), ("around", ("t2",), 5)]
     with pytest.raises(ToolError, match="no group 4"):
         after(found.plan, {"kind": "add", "n": 1, "to": "t2", "group": 4})
+
+
+HEXAGON = {"relation": "shape", "shape": {"kind": "polygon", "corners": 6, "where": "around"}}
+
+
+@pytest.mark.parametrize(
+    ("more", "demands", "told"),
+    [
+        ({"opening": 40.0, "opening_towards": "right"}, HEXAGON, ("the opening",)),
+        ({"clearance": (25.0, 26.0)}, HEXAGON, ("the distance",)),
+        ({"sides": ("left",)}, {"relation": "inside"}, ("the sides",)),
+        ({"opening": 40.0}, {"relation": "cage", "closure": "ring"}, ()),
+        ({"clearance": (25.0, 26.0)}, {"relation": "cage", "closure": "ring"}, ()),
+        ({}, HEXAGON, ()),
+    ],
+)
+def test_what_another_arrangement_has_no_place_for_is_told(
+    more: dict[str, Any], demands: dict[str, Any], told: tuple[str, ...]
+) -> None:
+    found = after(standing(**more), {"kind": "arrange", "demands": demands})
+    lost = [n for n in found.plan.verdict.notes if n.startswith("Not carried over")]
+    assert len(lost) == bool(told), lost
+    assert all(words in note for note in lost for words in told)
