@@ -19,7 +19,7 @@ from .followup import Followup
 from .followup_answers import words_meant
 from .followup_things import UNNAMED, pointing_at
 from .followups import commands, read_followup
-from .options import agrees, declines
+from .options import agrees, declines, numbered
 from .pointed import shown_now, using_pointed
 from .sharing import shared
 from .standing import Standing
@@ -130,8 +130,7 @@ def _goes_on(messages: History, standing: Standing | None) -> bool:
 
 def _question(followup: Followup) -> str:
     """Return the question with its options numbered."""
-    options = [f"{k}: {option}" for k, option in enumerate(followup.options, 1)]
-    return f"{followup.text} {'; '.join(options)}." if options else followup.text
+    return numbered(followup.text, followup.options) if followup.options else followup.text
 
 
 class _Steps:
