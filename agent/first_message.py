@@ -37,6 +37,7 @@ class Task:
         deploy: whether robots are to move once the plan is certified.
         metres_per_pixel: scale of the picture; None if it has none.
         standing: in a later turn, the current plan and what led to it; see `standing`.
+        robot_radius: px; None if nothing says how large the robots are.
         size: width and height of the picture, px.
         nouns: whether things can be found by nouns.
     """
@@ -48,6 +49,7 @@ class Task:
     deploy: bool
     metres_per_pixel: float | None = None
     standing: dict[str, Any] | None = None
+    robot_radius: float | None = None
     size: tuple[int, int] = (0, 0)
     nouns: bool = False
 
@@ -81,6 +83,7 @@ def task_text(context: Context, how: str = "", *, follows: bool = False) -> str:
         "Robots": settings.robots,
         "Picture": f"{picture.width} x {picture.height} px{how}",
         **({} if scale is None else {"Metres per pixel": scale}),
+        **({"Robot radius": radius} if (radius := settings.robot_radius) else {}),
         "Pointed at": pointed,
         "Targets": [] if follows else [t.id for t in world.targets],
         "Deploy": settings.may_deploy,
@@ -165,9 +168,14 @@ def read_task(text: str) -> Task:
         deploy=facts["Deploy"],
         metres_per_pixel=facts.get("Metres per pixel"),
         standing=facts.get("Standing"),
+        robot_radius=facts.get("Robot radius") or _radius_of(facts.get("Standing")),
         size=_size(facts["Picture"]),
         nouns=facts.get("Nouns are found", False),
     )
+
+
+def _radius_of(standing: dict[str, Any] | None) -> float | None:
+    return standing["contract"].get("robot_radius") if standing else None
 
 
 def _size(words: str) -> tuple[int, int]:

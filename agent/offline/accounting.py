@@ -4,66 +4,45 @@ Each word is taken by one rule, refers to a thing, is a known word of the comman
 that is quoted back to the person, or is left unread: then the planner quotes it and asks.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
-from .barring import ENDS, MAY_BE, Barring
+from .barring import MAY_BE, Barring
 from .demand_fields import LENGTHS, Fields
 from .demands import (
     PURPOSES,
     Item,
     demands_in,
     items_of,
-    says_inside,
-    says_more,
     says_others,
     sentences,
     stops_in,
 )
-from .drawn_forms import CORNERED, form_in
+from .drawn_forms import form_in
 from .evidence import meaning_of, weighed
 from .languages import foreign_language
-from .lexicon import CLASSES_OF, NEGATIONS, WEIGHTY, fillers, goes_with, may_command, weighs
+from .leftovers import PLACES, Leftovers, demands_more
+from .lexicon import CLASSES_OF, WEIGHTY, may_command
 from .reading import Reading
 from .spans import may_open
 from .tagging import tag, tokens, word_classes
 
-SURE_BACKGROUND, SURE_ALONE, SURE_NUMBER = 0.5, 0.8, 0.8
-"""Least probabilities of background: of a word next to some, of a word alone, and of a number."""
 SCENIC, WEIGHTY_SCENIC = 0.4, 0.5
 """Least share of non-command words that makes a sentence background; second: a weighty one."""
-REASONS = frozenset(("so", "because", "since", "before", "until", "while", "lest", "for", "as"))
-"""Words with which a reason or purpose begins."""
-OF_OTHERS = frozenset(("keep_out", "faced", "left_alone", "rings_of"))
+OF_OTHERS = frozenset(
+    ("keep_out", "faced", "left_alone", "rings_of", "aimed_opening", "keep_off_by")
+)
 """Demands that name a thing other than the one the arrangement is about."""
 LONGEST_CALL = 3
 """Most words of an exclamation that only addresses somebody: "Ball boys!"."""
-LINES = frozenset(("file", "line", "row", "column", "arc", "circle", "ring", "grid", *CORNERED))
-"""Forms robots may stand in; words that say "a" and one of these are never background."""
 RINGS = frozenset(("ring", "radius", "diameter"))
 """Demands that only a ring can meet."""
-SPEAKERS = frozenset(("i", "we", "you", "one", "people", "visitors", "everyone", "everybody"))
-"""After "so" one of these begins a purpose, which demands nothing more."""
 STATING = frozenset(
     ("is", "are", "was", "were", "has", "have", "had", "could", "might", "will", "it's", "there's")
 )
 """Words that mark a sentence as a statement."""
 VAGUE = {"nobody", "area"}
 """Classes of everyday words: a sentence with no others does not name an arrangement."""
-ASKED_CLASSES = frozenset(("gap", "avoid", "far", "near", "side", "face", "each", "motion"))
-"""Classes of words that may make a reason a demand."""
-PLACES = {
-    "around": ("around", "round", "about"),
-    "inside": ("inside", "in", "on", "within", "over", "across", "onto", "into"),
-    "along": ("beside", "by", "near", "at", "to"),
-}
-"""Words directly before a thing, by the place they give to a drawn form."""
 WITHIN = frozenset(PLACES["inside"])
-PREPOSITIONS = frozenset(word for words in PLACES.values() for word in words)
-BEFORE_NOUNS = frozenset(("around", "round", "inside", "within", "along", "beside", "across"))
-"""Words after which a noun without an article names the thing: "8 inside bunker"."""
-LONGEST_NAME = 3
-DEFINITE = frozenset(("the", "this", "that", "these", "those", "my", "our", "your"))
-"""Determiners that begin a phrase for a thing after a preposition."""
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
 """Words that make a distance one to keep outside the thing."""
 
@@ -112,7 +91,8 @@ class _Reader:
             or d.sets in PURPOSES
             or not self.prevented.issuperset(range(d.first, d.last))
         )
-        self.scenery = self._scenery()
+        self.leftovers = Leftovers(text, items, reading, self.classes, self.taken, self.barring)
+        self.leftovers.scenery = self._scenery()
 
     def read(self) -> Reading:
         """Return the reading, including what no rule took."""
@@ -120,7 +100,7 @@ class _Reader:
         for demand in self.demands:
             if not self.fields.apply(demand):
                 self.reading.unread.append(self._quote(demand.first, demand.last))
-            elif demand.sets not in OF_OTHERS:  # what it names is the target
+            elif demand.sets not in OF_OTHERS:
                 self.fields.mentioned += range(demand.first, demand.last)
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
         for demand in self.fields.unsettled():
@@ -129,7 +109,7 @@ class _Reader:
         self._refer()
         self.reading.place = self._place()
         self._count_alone()
-        self._account()
+        self.leftovers.account()
         return self.reading
 
     def _count_corners(self) -> None:
@@ -159,15 +139,22 @@ class _Reader:
                 share = 1.0
             goes_on = sentence[-1].symbol == ";"
             counts = [
-                k for k in place if self.items[k].quantity and not self._is_background_number(k)
+                k
+                for k in place
+                if self.items[k].quantity and not self.leftovers.is_background_number(k)
             ]
-            if demanded & {*place} or counts:
+            if demanded & {*place} or counts or self._arranges(place):
                 share = 1.0
             ordered = any(d.sets == "robots" and d.first in place for d in self.demands)
             if sentence[-1].symbol == "?" and not ordered:
                 share = 0.0
             scenic += [bool(words) and len(aside) >= share * len(words)] * len(sentence)
         return scenic if not all(scenic) else [False] * len(self.items)
+
+    def _arranges(self, place: Iterable[int]) -> bool:
+        """Return whether a word of the command there says the arrangement."""
+        says = {*CLASSES_OF.get(self.reading.relation, ())} - VAGUE
+        return any(self.items[k].label == "command" and self.classes[k] & says for k in place)
 
     def _settle_meaning(self) -> None:
         """Put the arrangement that the demands force first: a named form, a row at a named side."""
@@ -180,7 +167,7 @@ class _Reader:
             forced = "between"
         else:
             forced = forced or self._demanded(sets)
-        if forced and reading.relation != "ask":
+        if forced and (reading.relation != "ask" or "all_round" in sets):
             reading.meanings = [(forced, 1.0), *reading.meanings]
 
     def _demanded(self, sets: set[str]) -> str | None:
@@ -193,6 +180,11 @@ class _Reader:
                 return next(m for m, _ in reading.meanings if m in likely)
         if sets & RINGS and reading.relation not in ("around", "cage", "ask"):
             return "around"
+        if "faced" in sets and reading.relation == "around" and not self._surrounds():
+            return "along"
+        opens = sets & {"opening", "aimed_opening"} and self._surrounds("enclose")
+        if opens and reading.relation == "along":
+            return next(m for m, _ in reading.meanings if m in ("around", "cage"))
         rows = "groups" in sets and reading.relation in ("several", "around", "along")
         if rows or ("each_side" in sets and not self._surrounds()):
             return "along"
@@ -202,14 +194,16 @@ class _Reader:
             within = any(item.symbol in WITHIN for item in self.items)
             kept = reading.sure and (within or reading.relation != "inside")
             return reading.relation if kept else "around"
+        if "all_round" in sets and reading.relation in ("ask", "several"):
+            return "around"
         unsure = not reading.sure and reading.relation != "ask"
         return "along" if "side" in sets and unsure else None
 
-    def _surrounds(self) -> bool:
+    def _surrounds(self, *kinds: str) -> bool:
         """Return whether a command word by itself says all round: "surround it, four a side"."""
         sided = [range(d.first, d.last) for d in self.demands if d.sets == "each_side"]
         return any(
-            item.label == "command" and "surround" in self.classes[k]
+            item.label == "command" and self.classes[k] & {"surround", *kinds}
             for k, item in enumerate(self.items)
             if not any(k in span for span in sided)
         )
@@ -223,6 +217,10 @@ class _Reader:
     def _parts(self) -> bool:
         """Return whether the command says "between", which settles the arrangement."""
         lengths = [range(d.first, d.last) for d in self.demands if d.sets in LENGTHS]
+        if any(
+            d.sets == "two_things" and self.items[d.first].symbol == "from" for d in self.demands
+        ):
+            return True
         return any(
             item.symbol == "between"
             and item.label == "command"
@@ -241,15 +239,12 @@ class _Reader:
                     self.taken[k] = False
                 elif says_others(phrase):
                     self.reading.background.append(phrase)
-                elif self._demands(phrase) or (self.reading.things and not may_open(first)):
+                elif demands_more(phrase, self.reading.relation) or (
+                    self.reading.things and not may_open(first)
+                ):
                     self.reading.unread.append(phrase)
                 else:
                     self.reading.things.append(phrase)
-
-    def _demands(self, phrase: str) -> bool:
-        """Return whether a phrase for a thing says more than which, or where else robots stand."""
-        outside = self.reading.relation not in ("inside", "centre")
-        return says_more(phrase) or (outside and says_inside(phrase))
 
     def _place(self) -> str:
         """Return where a form is drawn, by the word before the thing; "" where it does not say."""
@@ -273,127 +268,6 @@ class _Reader:
             if quantity is not None and quantity.whole is not None:
                 self.reading.robots = quantity.whole
                 self.taken[free[0]] = True
-
-    def _account(self) -> None:
-        """Sort the words that nothing took into background and unread."""
-        kinds = [self._kind(k) for k in range(len(self.items))]
-        for first, last in self._runs():
-            within = kinds[first:last]
-            if "unread" in within:
-                self._account_unread(first, last)
-                continue
-            aside = [k for k in range(first, last) if kinds[k] == "background"]
-            said = {self.items[k].symbol for k in aside}
-            if said - fillers() - REASONS:
-                reading = self.reading
-                sort = reading.unread if said & LINES and "a" in said else reading.background
-                sort.append(self._quote(aside[0], aside[-1] + 1))
-
-    def _account_unread(self, first: int, last: int) -> None:
-        """Sort unread words: a reason is background, what follows "around the" may be the thing."""
-        reading = self.reading
-        at = next((k for k in range(first, last) if self.items[k].symbol in BEFORE_NOUNS), first)
-        if "unread" not in map(self._kind, range(first, at)):
-            first = at  # "ring" is known in "ring around fountain"
-        words = [i.symbol for i in self.items[first:last]]
-        named = words[0] in PREPOSITIONS and len(words) > 2 and words[1] in DEFINITE
-        named = named or (words[0] in BEFORE_NOUNS and self._is_bare(first + 1, last))
-        known = {w for thing in reading.things for w in thing.lower().split()}
-        if words[0] in ("from", "at", "to", "of") and {*words[1:]} and {*words[1:]} <= known:
-            return
-        if words[0] == "between" and words[-1] == "and" and self._is_bare(first + 1, last - 1):
-            reading.things.insert(0, self._quote(first + 1, last - 1))
-        elif self._gives_reason(first, last):
-            reading.background.append(self._quote(first, last))
-        elif named and not reading.things and self._only_names(first + 1, last):
-            reading.things.append(self._quote(first + 1, last))
-        else:
-            reading.unread.append(self._quote(first, last))
-
-    def _is_bare(self, first: int, last: int) -> bool:
-        """Return whether words are a noun, perhaps with adjectives, without an article."""
-        words = [i.symbol for i in self.items[first:last]]
-        plain = all(w.isalpha() and w not in WEIGHTY | fillers() for w in words)
-        telling = any(self.classes[k] & ASKED_CLASSES - {"motion"} for k in range(first, last))
-        return plain and not telling and 0 < len(words) <= LONGEST_NAME
-
-    def _only_names(self, first: int, last: int) -> bool:
-        """Return whether words can be a phrase for a thing that says nothing else."""
-        says = any(i.quantity or i.symbol in NEGATIONS for i in self.items[first:last])
-        return not says and not self._demands(self._quote(first, last))
-
-    def _gives_reason(self, first: int, last: int) -> bool:
-        """Return whether a stretch of words is a reason or purpose that demands nothing more."""
-        words = self.items[first:last]
-        if any(i.quantity for i in words):
-            return False
-        caged = self.reading.relation == "cage"
-        weighty = [i for i in words if i.symbol in WEIGHTY]
-        if caged and any(i.symbol in NEGATIONS for i in words):
-            return all(i.symbol in NEGATIONS for i in weighty)
-        opening = [i.symbol for i in words[:3] if i.symbol != "that"]
-        if opening[0] == "so" and opening[1:2] and opening[1] in SPEAKERS:
-            return True
-        if words[0].symbol not in REASONS or weighty:
-            return False
-        if {"opening", "sides"} & set(self.reading.group):
-            return True
-        return not any(self.classes[k] & ASKED_CLASSES for k in range(first, last))
-
-    def _runs(self) -> Iterator[tuple[int, int]]:
-        """Yield runs of words that no rule took, as first and past-the-last index."""
-        open_ = [not self.taken[k] and item.symbol not in ENDS for k, item in enumerate(self.items)]
-        start = 0
-        while start < len(open_):
-            end = start
-            while end < len(open_) and open_[end]:
-                end += 1
-            if end > start:
-                yield start, end
-            start = max(end, start + 1)
-
-    def _kind(self, k: int) -> str:
-        """Return "" for an item that is accounted for, else "filler", "background" or "unread"."""
-        item = self.items[k]
-        if self.taken[k] or not (
-            item.symbol[0].isalnum() or item.symbol in ("<t>", "<n>", "<l>", "<a>", "<s>", "<c>")
-        ):
-            return ""
-        caged = self.reading.relation == "cage" and item.quantity is None
-        if self.scenery[k] or (caged and k in self.prevented):
-            return "background"
-        if item.quantity is not None:
-            return (
-                ""
-                if self._counts_corners(item)
-                else "background"
-                if self._is_background_number(k)
-                else "unread"
-            )
-        beside = {self.items[n].label for n in (k - 1, k + 1) if n in range(len(self.items))}
-        sure = SURE_BACKGROUND if "background" in beside else SURE_ALONE
-        if item.label == "background" and item.certainty >= sure:
-            return "background"
-        if weighs(item.symbol, self.classes[k], self.reading.relation):
-            return "unread"
-        if item.symbol in fillers():
-            return "filler"
-        if "polite" in self.classes[k] and "place" not in self.classes[k]:
-            return "background"
-        known = goes_with(item.symbol, self.classes[k], self.reading.relation)
-        return "" if known else "unread"
-
-    def _is_background_number(self, k: int) -> bool:
-        """Return whether a number stands in a clause that is surely background: "come at three"."""
-        clause = next(c for c in self.clauses if k in c)
-        words = [self.items[j] for j in clause]
-        told = all(i.label in ("background", "thing") for i in words if i.symbol not in ENDS)
-        return self.items[k].symbol == "<n>" and told and self.items[k].certainty >= SURE_NUMBER
-
-    def _counts_corners(self, item: Item) -> bool:
-        """Return whether a number counts the corners, or the one robot at each."""
-        number = item.quantity and item.quantity.whole
-        return self.reading.relation == "corners" and number in (1, 4, self.reading.robots)
 
     def _quote(self, first: int, last: int) -> str:
         return " ".join(self.text[self.items[first].start : self.items[last - 1].end].split())

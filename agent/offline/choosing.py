@@ -356,3 +356,15 @@ def _sentence(text: str) -> str:
     named = CANDIDATE_ID.match(text)  # which is written as it is
     begin = text[:1] if named else text[:1].upper()
     return begin + text[1:].rstrip(".") + "." if text else ""
+
+
+def candidate_notes(history: History) -> list[str]:
+    """Return sentences on which candidates were taken for the things meant, and why."""
+    last = next(c for c in calls_in(history)[::-1] if c.name == "propose_formation")
+    reasons = located_reasons(history)
+    return [
+        f"Took {p['candidate']} for the {p.get('label') or 'thing chosen'}"
+        + (f": {'; '.join(reasons[p['candidate']])}." if reasons.get(p["candidate"]) else ".")
+        for p in last.arguments["targets"]
+        if p.get("candidate")
+    ]

@@ -14,6 +14,7 @@ from ..messages import Call, History, Reply, Result, User
 from .amending import repaired
 from .answering import arrived, heading_text, query_text, said_of_edit, said_of_undo, talk
 from .choosing import Step, calls_in, chosen_candidates, prompts_of
+from .correcting import amendments, corrected
 from .finding import found_thing, known_thing, measured_at
 from .followup import Followup
 from .followup_answers import words_meant
@@ -37,10 +38,10 @@ def conversed(task: Task, turn: History, before: History) -> Reply | tuple[Task,
     standing = _standing(task, before)
     new = standing is not None and any(p["id"] not in task.targets for p in task.pointed)
     words, messages = pointing_at(task.instruction) if new else task.instruction, turn[1:]
-    followup = read_followup(words, standing)
+    followup = corrected(read_followup(words, standing), words, standing)
     if standing is None and not before and followup.kind != "talk":
         return replace(task, instruction=repaired(words)), turn
-    while followup.kind == "ask" or _goes_on(messages, standing):
+    while followup.kind == "ask" or _goes_on(messages, standing, words):
         answer, messages = _answer_to(messages)
         if answer is None:
             offered = {"options": list(followup.options)} if followup.options else {}
@@ -117,15 +118,20 @@ def _answer_to(messages: History) -> tuple[str | None, History]:
     return None, messages
 
 
-def _goes_on(messages: History, standing: Standing | None) -> bool:
-    """Return whether an answer to "which thing?" chooses none and is a command of its own."""
+def _goes_on(messages: History, standing: Standing | None, words: str) -> bool:
+    """Return whether an answer to "which thing?" chooses none and is a command of its own.
+
+    Or it names a known thing instead of the one in `words` that was asked about.
+    """
     answer, later = _answer_to(messages)
     until = messages[: len(messages) - len(later)]
     asked = [c for c in calls_in(until) if c.name == "ask_user"]
     if answer is None or standing is None or not asked[-1].arguments.get("candidates"):
         return False
-    own = not chosen_candidates(until, 1) and commands(answer, standing)
-    return own or _goes_on(later, standing)
+    chosen = chosen_candidates(until, 1)
+    named = amendments(answer, words, standing)
+    own = commands(answer, standing) or not all(read_followup(t, standing).things for t in named)
+    return (not chosen and own) or _goes_on(later, standing, words)
 
 
 def _question(followup: Followup) -> str:

@@ -1,19 +1,18 @@
 """Rules that carry demands of an instruction over into fields of the contract."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from .counting import count_left_open
 from .demands import Demand, Item, is_part
 from .drawn_forms import Form
 from .lexicon import fillers
-from .portions import OPPOSITE, Portions
+from .other_things import OtherThings
+from .portions import FARTHEST, OPPOSITE
 from .reading import Reading
-from .tagging import tokens, word_classes
+from .tagging import word_classes
 
-FARTHEST = 100_000
-"""Upper bound of a clearance that has none, px."""
 OPENS = {side: side for side in ("left", "right", "up", "down")} | {"top": "up", "bottom": "down"}
 COUNTING = frozenset(
     ("of", "in", "with", "using", "by", "use", "total", "altogether", "strong", "number")
@@ -22,24 +21,18 @@ COUNTING = frozenset(
 DEGREES = {"right": 0, "bottom": 90, "down": 90, "left": 180, "top": 270, "up": 270}
 LEAST_BARE = 5
 """Least number without a unit that may be a length, px."""
-SEVERAL = re.compile(r"\b(?:two|three|four|five|six|both|pair|[a-z]+[^s\W]s)\b")
-"""Words that a phrase for more than one thing contains."""
-FAR_OFF = frozenset(("well", "far", "long", "plenty", "safe", "good"))
-"""Words of "stay well away from it" that say how far."""
 LENGTHS = ("clearance", "pitch", "min_spacing", "max_gap", "radius", "diameter", "opening")
 
 
-class Fields(Portions):
+class Fields(OtherThings):
     """Carries demands over into a reading."""
 
     def __init__(
         self, text: str, items: Sequence[Item], reading: Reading, metres_per_pixel: float | None
     ) -> None:
-        super().__init__(items, reading)
-        self.text = text
-        self.scale = metres_per_pixel
+        super().__init__(text, items, reading, metres_per_pixel)
         self.corners: list[int] = []  # how many corners the words name
-        self.mentioned: list[int] = []  # items of demands whose phrases may name the target
+        self.count_at = -1  # first item of the words that leave the number of robots open
         self.reaches: dict[int, int] = {}  # past-the-last item of phrases for things that go on
 
     def apply(self, demand: Demand) -> bool:
@@ -82,6 +75,29 @@ class Fields(Portions):
             return relation in ("around", "cage") and low == high and self._set("radius", radius)
         return self._spaced(demand, low, high)
 
+    def _keep_off_by(self, demand: Demand) -> bool:
+        """Read a distance to keep from another thing: "stay 50 px clear of the trucks"."""
+        other = self._other(demand) or self._marked(demand)
+        if other is None or is_part(other) or not self._refers_elsewhere(demand):
+            return self._length(replace(demand, sets="clearance"))
+        px = self._px_of(demand)
+        known = self.reading.keep_out_clearance
+        if not px or demand.bound == "most" or known not in (0.0, px):
+            return False
+        self.reading.keep_out_clearance = px
+        self.reading.others += [other] if other not in self.reading.others else []
+        return True
+
+    def _px_of(self, demand: Demand) -> float | None:
+        """Return a demand's least length, px; None if it has none, or no scale to measure it by."""
+        quantity = demand.quantity
+        if quantity is None or not quantity.is_length:
+            return None if quantity is None else quantity.least
+        px = quantity.px(self.scale)
+        if px is None:
+            self.reading.unscaled.append(quantity.wording)
+        return px and px[0]
+
     def _length_alone(self, demand: Demand) -> bool:
         """Read a length that ends the words about a ring as its distance from the thing."""
         rings = self.reading.relation in ("around", "cage", "corners")
@@ -97,6 +113,8 @@ class Fields(Portions):
         name = demand.sets
         if name == "pitch" and demand.bound:
             name = "min_spacing" if demand.bound == "least" else "max_gap"
+        if name == "pitch" and self.reading.relation == "inside" and self.reading.count == "fit":
+            name = "min_spacing"
         if name == "pitch" and low < high:
             return self._set("min_spacing", low) and self._set("max_gap", high)
         return self._set(name, low if name != "max_gap" else high)
@@ -142,9 +160,16 @@ class Fields(Portions):
             return False
         return self._only([f"{demand.sides[0]} half"])
 
-    def _heading(self, demand: Demand) -> bool:
-        sole = [i.symbol for i in self.items].count("<t>") < 2
-        return (sole or self._other(demand) is None) and self._set("heading", demand.value)
+    def _aimed_opening(self, demand: Demand) -> bool:
+        """Read an opening towards another thing: "a gap towards the gate", "the door side free"."""
+        phrase = self._other(demand) or self._noun_in(demand)
+        low = demand.quantity.px(self.scale) if demand.quantity else (0.0, 0.0)
+        return (
+            phrase is not None
+            and low is not None
+            and self._opening(demand, low[0])
+            and self._aim("opening_towards", phrase)
+        )
 
     def _heading_side(self, demand: Demand) -> bool:
         return self._set("heading", DEGREES[demand.sides[0]])
@@ -159,38 +184,6 @@ class Fields(Portions):
         self.reading.form = Form({"kind": demand.value}, names[demand.value])
         return True
 
-    def _keep_out(self, demand: Demand) -> bool:
-        other = self._other(demand)
-        if other is None:  # of the thing itself, which they stand off anyway
-            far = FAR_OFF & {i.symbol for i in self.items[demand.first : demand.last]}
-            stands = self.reading.relation in ("around", "cage", "along", "corners")
-            return stands and (not far or self._set("fit", "wide"))
-        self.reading.others.append(other)
-        return True
-
-    def _faced(self, demand: Demand) -> bool:
-        named = [k for k in range(demand.first, demand.last) if self.items[k].symbol == "<t>"]
-        if not named or self.reading.relation != "along" or self.reading.faced:
-            return False
-        self.reading.faced = self._quote(named[-1], named[-1] + 1)
-        self.mentioned += named[:-1]
-        return True
-
-    def _other(self, demand: Demand) -> str | None:
-        """Return a demand's phrase for a thing that the arrangement is not about; None if none."""
-        within = range(demand.first, demand.last)
-        phrases = {k: self._words_of(k) for k, i in enumerate(self.items) if i.symbol == "<t>"}
-        mine = [words for k, words in phrases.items() if k not in within]
-        for k in within:
-            if k in phrases and not any(phrases[k] <= words for words in mine):
-                return self.text[self.items[k].start : self.items[k].end]
-        return None
-
-    def _words_of(self, k: int) -> set[str]:
-        item = self.items[k]
-        words = {w.text for w in tokens(self.text[item.start : item.end]) if w.text.isalpha()}
-        return words - fillers()
-
     def _robots(self, demand: Demand) -> bool:
         number = next((q for q in demand.numbers if q.kind in ("number", "compound")), None)
         if number is None:
@@ -201,7 +194,15 @@ class Fields(Portions):
             self.reading.odd_count = self._quote(demand.first, demand.last)
             return True
         self._note_kind(demand)
+        if self.count_at > demand.first:  # "5 robots, as many as needed": which?
+            return False
         return self._robots_are(number.whole)
+
+    def _count(self, demand: Demand) -> bool:
+        """Leave the number of robots to the tools: "as many as needed"."""
+        open_still = self.reading.robots is None and self.reading.count in ("", demand.value)
+        self.reading.count, self.count_at = demand.value, demand.first
+        return open_still and count_left_open(self.reading) is not None
 
     def _note_kind(self, demand: Demand) -> None:
         """Note words for the kind of robot as background: "24 small yellow robots"."""
@@ -228,6 +229,9 @@ class Fields(Portions):
     def _ring(self, demand: Demand) -> bool:
         return self._all_round(demand)
 
+    def _rest_closed(self, demand: Demand) -> bool:
+        return "opening" in self.reading.group or "opening_towards" in self.reading.group
+
     def _purpose(self, demand: Demand) -> bool:
         return self._left_alone(demand)
 
@@ -250,16 +254,6 @@ class Fields(Portions):
 
     def _apart(self, demand: Demand) -> bool:
         """Accept that robots must not touch: those of a certified plan never do."""
-        return True
-
-    def _which_of(self, demand: Demand) -> bool:
-        """Accept which of several things is meant, "the upper of the drums"; not a part of one."""
-        after = self.items[demand.last]
-        return SEVERAL.search(self.text[after.start : after.end].lower()) is not None
-
-    def _left_alone(self, demand: Demand) -> bool:
-        """Note other things as background: robots keep off them anyway."""
-        self.reading.background.append(self._quote(demand.first, demand.last))
         return True
 
     def _at_each(self, demand: Demand) -> bool:
@@ -311,6 +305,3 @@ class Fields(Portions):
 
     def _layout(self, demand: Demand) -> bool:
         return self.reading.relation == "between" and self._set("layout", demand.value)
-
-    def _quote(self, first: int, last: int) -> str:
-        return " ".join(self.text[self.items[first].start : self.items[last - 1].end].split())

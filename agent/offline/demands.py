@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from ...tools.formation.quantities import Quantity, quantities_in
+from .relabelled import relabelled
 from .tagging import Tagging, Token
 
 SYMBOLS = {"px": "<l>", "m": "<l>", "degrees": "<a>", "share": "<s>", "compound": "<c>"}
@@ -21,7 +22,7 @@ ALWAYS = ("a negation", "a cancellation", "something past", "another task", "a s
 """Kinds of stops that also count in words that look like background beside an order."""
 POINTING = ("no", "the", "each", "every", "any", "this", "that", "single", "next")
 """Words before a "one" that stands for a noun."""
-PURPOSES = ("closure",)
+PURPOSES = ("closure", "count")
 """What is also demanded by what sounds like background: "so that it cannot get out"."""
 OF_ROBOTS = re.compile(
     r"\b(?:so|such|way) (?:that )?(?:they|all|each|every|every(?:one|body)|(?:the )?robots)\b"
@@ -69,6 +70,7 @@ class Demand:
         numbers: all quantities in it.
         bound: whether the quantity is the "least" or the "most"; "" for neither.
         first, last: its items, first and past-the-last index.
+        other: the same of a phrase in it for another thing, where the rule marks one.
     """
 
     sets: str
@@ -79,14 +81,16 @@ class Demand:
     bound: str
     first: int
     last: int
+    other: tuple[int, int] | None = None
 
 
 def items_of(text: str, words: Sequence[Token], tagging: Tagging) -> tuple[Item, ...]:
     """Return the symbols of an instruction; adjacent words for things become one."""
-    labels = dict(zip((w.start for w in words), tagging.labels, strict=True))
+    corrected = relabelled(words, tagging.labels)
+    labels = dict(zip((w.start for w in words), corrected, strict=True))
     plain = [q for q in quantities_in(text) if _is_plain(q, words, labels)]
     found: list[Item] = []
-    for word, label, certainty in zip(words, tagging.labels, tagging.certainty, strict=True):
+    for word, label, certainty in zip(words, corrected, tagging.certainty, strict=True):
         last = found[-1] if found else None
         covering = next((q for q in plain if q.start <= word.start < q.end), None)
         if covering is not None:
@@ -259,6 +263,7 @@ def _demand(
         bound,
         first,
         last,
+        next((line.items_of(match, n) for n in named if n.rstrip("0123456789") == "other"), None),
     )
 
 

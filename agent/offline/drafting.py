@@ -5,6 +5,7 @@ from typing import Any
 
 from ...tools.formation.contract import MAX_ROBOTS
 from ..first_message import Task
+from .counting import how_far_apart
 from .drawn_forms import BESIDE, ENCLOSING, SIDES
 from .options import numbered
 from .reading import Reading, unscaled
@@ -34,6 +35,7 @@ def question_of(task: Task, reading: Reading, robots: int | None) -> str | None:
         or _stopped(reading)
         or _not_understood(reading, robots)
         or _unsettled(reading)
+        or how_far_apart(reading)
         or _how_many(reading, robots)
         or (None if task.robots else _too_few(reading, robots))
         or which_things(task, reading)
@@ -52,7 +54,7 @@ def would_do(task: Task, reading: Reading, robots: int) -> bool:
     """Return whether all but some unread words is settled, so that a contract can be shown."""
     settled = not (reading.stops or reading.unscaled or _unsettled(reading))
     settled = settled and _too_few(reading, robots) is None
-    settled = settled and not (reading.others or reading.faced or which_things(task, reading))
+    settled = settled and not (reading.named or which_things(task, reading))
     return settled and bool(reading.unread)
 
 
@@ -70,17 +72,19 @@ def contract_of(
         reading: of the instruction, with nothing left to ask.
         robots: total number.
         targets: ids of what the arrangement is about.
-        others: ids of what to stay clear of; the last is what a row faces, if it faces one.
+        others: ids of `reading.named`: what to stay clear of, then what a row faces or aims at.
         attempt: how many places beside the target had no room for a form.
     """
     fields = {"spacing": "even", "fit": "normal"} | reading.group
     basics = {"targets": targets, **fields}
-    if reading.faced:
-        *others, faced = others
-        basics |= {"facing": faced}
+    looked_at = [*(["facing"] if reading.faced else []), *reading.aims]
+    others, ids = others[: len(others) - len(looked_at)], others[len(others) - len(looked_at) :]
+    basics |= dict(zip(looked_at, ids, strict=False))
     contract: dict[str, Any] = {"groups": _groups(reading, robots, basics, attempt)}
     if others:
         contract["keep_out"] = others
+        if reading.keep_out_clearance:
+            contract["keep_out_clearance"] = reading.keep_out_clearance
     if reading.robot_radius is not None:
         contract["robot_radius"] = reading.robot_radius
     return contract
@@ -103,8 +107,11 @@ def _groups(
         if sum(counts) != robots and len(counts) == 2:
             counts = [robots - robots // 2, robots // 2]
         sides = [side for side, _ in reading.shares]
-        rows = zip(sides, counts, strict=True)
-        return [basics | {"relation": "along", "side": s, "robots": n} for s, n in rows]
+        off = {side: {"clearance": [*px]} for side, px in reading.distances.items()}
+        return [
+            basics | {"relation": "along", "side": s, "robots": n} | off.get(s, {})
+            for s, n in zip(sides, counts, strict=True)
+        ]
     if reading.rings == 2:
         outer = basics | {"fit": "wide"}
         if "clearance" in basics:
@@ -223,7 +230,12 @@ def _how_many(reading: Reading, robots: int | None) -> str | None:
         return (
             f"{form.wording} takes {form.robots} robots, {robots} were named. Which?".capitalize()
         )
-    return None if robots else "How many robots? Say a number."
+    if robots:
+        return None
+    open_count = {"around": "needed", "cage": "needed", "inside": "fit"}.get(reading.relation)
+    return "How many robots? Say a number" + (
+        f", or as many as {open_count}." if open_count else "."
+    )
 
 
 def _too_few(reading: Reading, robots: int | None) -> str | None:
@@ -236,9 +248,7 @@ def which_things(task: Task, reading: Reading) -> str | None:
     """Return what to ask if the number of things pointed at does not fit; None if it does."""
     pointed = _pointed(task)
     needed = things_needed(reading)
-    if reading.others and len(pointed) == needed + len(reading.others):
-        return None
-    if reading.faced and len(pointed) == needed + 1:
+    if reading.named and len(pointed) == needed + len(reading.named):
         return None
     if len(pointed) == 1 and needed == 2:
         return "Which two things? Point at both."

@@ -113,10 +113,11 @@ def _figure(text: str) -> Found:
     names = "|".join(CORNERED)
     tips = rf"(?:(?P<tips>{COUNT})[- ]pointed\s+)?"
     figure = (
-        rf"{SIZES}(?:regular\s+)?"
-        rf"(?:{tips}(?P<star>star)|(?P<name>{names}))(?![\w-]|\s+of\s+the)"
+        rf"{SIZES}(?:(?:regular|equilateral|perfect|hollow)\s+)?"
+        rf"(?:{tips}(?P<star>star)|(?P<name>{names})(?:\s+(?:formation|shape))?)"
+        r"(?![\w-]|\s+of\s+the)"
     )
-    led, begun = rf"(?i)(?:{MAKE}|{STAND})an?\s+{figure}", r"(?i)(?P<kept>^\s*)(?:an?\s+)?"
+    led, begun = rf"(?i)(?:{MAKE}|{STAND})(?:an?\s+)?{figure}", r"(?i)(?P<kept>^\s*)(?:an?\s+)?"
     by = r"(?=\s+(?:a?round|about|with|left of|right of|above|below)\b)"
     found = re.search(led, text) or re.search(f"{begun}{figure}{by}", text)
     if found is None:

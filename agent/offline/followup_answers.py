@@ -6,6 +6,7 @@ It may choose an option, fill in what was left open, or be a command of its own.
 import re
 from collections.abc import Sequence
 
+from .correcting import amendments
 from .followup import Followup
 from .followups import commands, read_followup
 from .options import agrees, option_at, option_named
@@ -48,7 +49,8 @@ def words_meant(words: str, followup: Followup, answer: str, standing: Standing 
     named = option_named(answer, followup.options)
     if named is not None:
         return followup.options[named]
-    for attempt in (*_filled_in(words, answer), f"{words} {answer}", f"{answer} {words}"):
+    amends = amendments(answer, words, standing) if standing else ()
+    for attempt in (*_filled_in(words, answer), *amends, f"{words} {answer}", f"{answer} {words}"):
         if read_followup(attempt, standing).kind not in ("ask", "refuse", "instruction"):
             return attempt
     return answer

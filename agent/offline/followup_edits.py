@@ -325,12 +325,22 @@ def heading(slots: Slots, said: Utterance) -> Effects:
 
 def keepout(slots: Slots, said: Utterance) -> Effects:
     """Keep robots clear of another thing."""
-    if not slots.has("thing", "there", "other"):
+    mine = slots.get("current", ())
+    if not (mine or slots.has("thing", "there", "other")):
         return ask(
             f'Which thing is to be kept clear of in "{said.words}"? Point at it, or name it.'
         )
-    to = where(slots, said, "keep clear of {}")
-    return to if isinstance(to, list) else [{"kind": "keep-out", "ids": [to]}]
+    to = str(mine[0]) if mine else where(slots, said, "keep clear of {}")
+    if isinstance(to, list):
+        return to
+    far = {"px": float(slots["px"][0])} if "px" in slots else {}
+    teams = [k for k, g in enumerate(said.standing.groups, 1) if g.get("targets") == [to]]
+    if far and teams:  # of the thing they stand about
+        group = {"group": teams[0]} if len(said.standing.groups) > 1 else {}
+        return [{"kind": "distance", **far, **group}]
+    if teams:
+        return [{"kind": "talk", "about": "already"}]  # robots stand off it anyway
+    return [{"kind": "keep-out", "ids": [to], **far}]
 
 
 def where(slots: Slots, said: Utterance, option: str = "around {}") -> str | list[Effect]:

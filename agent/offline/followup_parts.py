@@ -3,7 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .followup_edits import EXACT, Effect, Effects, Utterance, ask, factor_of, rounded, where
+from .followup_edits import (
+    EXACT,
+    Effect,
+    Effects,
+    Utterance,
+    ask,
+    factor_of,
+    listed,
+    rounded,
+    where,
+)
 from .followup_frames import Slots
 from .followup_teams import SHARES, how_many_fewer, how_many_more, whole
 from .followup_things import known
@@ -80,6 +90,23 @@ def allotted(slots: Slots, said: Utterance) -> Effects:
         known = all(t in groups for t, _ in pairs)
         return [{"kind": "remove", "n": n, "group": groups[t]} for t, n in pairs] if known else None
     return _moved(dict(pairs), groups, said, each=each)
+
+
+def split_among(slots: Slots, said: Utterance) -> Effects:
+    """Put as many robots at each of all things known: "split them over all three"."""
+    standing = said.standing
+    slots.used.update(slots)
+    things = [*standing.targets, *standing.others()]
+    groups = {str(g["targets"][0]): k for k, g in enumerate(standing.groups, 1) if _is_about_one(g)}
+    if len(groups) < len(standing.groups) or said.count < len(things):
+        return None
+    named = int(slots["among"][0])
+    if named not in (0, len(things)):
+        known = listed(things)
+        return ask(f"{len(things)} things are known, {known}, not {named}. Which ones?")
+    each, rest = divmod(said.count, len(things))
+    wish = {thing: each + (k < rest) for k, thing in enumerate(things)}
+    return _moved(wish, groups, said, each=False)
 
 
 def _is_about_one(group: Mapping[str, Any]) -> bool:

@@ -4,6 +4,7 @@ Its number replaces the phrase, so that whatever can be said of robot 3 can be s
 """
 
 import json
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -40,6 +41,7 @@ RANKS = "second|2nd|third|3rd|fourth|4th|fifth|5th"
 RANK = rf"(?:(?:(?P<rank>{RANKS})|last|end|outermost) )?"
 CORNER = r"(?: (?:corner|side|end|edge))?+(?: of (?:all|them|them all))?+"
 STANDS = r"(?:(?:(?:that|which|who)(?:'s| is| stands| sits)?|standing|sitting|placed) )?"
+NEAR = r"(?:nearest|closest|next|near|close)(?: to)? (?:the )?"
 AT = (
     rf"(?:(?:at|on|in) (?:the )?|to (?:the )?(?=very|far|extreme)|(?=furthest|farthest|most)){FAR}?"
     rf"(?:(?:to|on|at|in) (?:the )?)?{FAR}?"
@@ -52,15 +54,22 @@ PHRASES = tuple(
         rf"(?:{AT}|{FAR})?(?P<way>{WAY})(?: (?:one|{BOT}))?{CORNER}(?=\W*$| now| at the moment)",
         rf"\b(?:the |(?={MOST})){N}{RANK}{FAR}?(?P<way>{WAY})(?: corner| side| end)? {NOUN}"
         rf"(?! (?:of|(?:on|at|in) the {END})\b)",
-        rf"\b(?:the |that ){N}{RANK}{NOUN} {STANDS}(?:(?:counted )?from (?:the )?|{AT})"
+        rf"\b(?:the |that ){N}{RANK}{NOUN} {STANDS}(?:(?:counted )?from (?:the )?|{NEAR}|{AT})"
         rf"(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
         rf"\bthe (?P<way>{MOST})(?P<one>)"
         r"(?=\W*$|[,;.]| (?:[0-9]+|an? |by |should|must|has|further|farther|closer|out|in|up|down|"
         r"away|to|from|is|goes|and (?:the|robot))\b)",
         rf"\bthe (?P<rank>{RANKS})(?P<one>) from (?:the )?(?P<way>{END})\b{CORNER}",
+        rf"\bthe (?P<n>{'|'.join(AMOUNTS)})(?P<one>) {STANDS}(?:{NEAR}|{AT})"
+        rf"(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
     )
 )
 """Phrases for robots by where they stand; with the group `one`, for robots or things."""
+NEAREST = re.compile(
+    r"\b(?:the|that|whoever|whichever)\b.*\b(?:nearest|closest|next|furthest|farthest)\b",
+    re.IGNORECASE,
+)
+"""Words that may name a robot by how near it is to a thing."""
 BOTH = re.compile(
     rf"\bthe (?P<a>{FAR}?{WAY}) and (?:the )?(?P<b>{FAR}?{WAY}) (?P<noun>{BOT}|one)s?\b",
     re.IGNORECASE,
@@ -81,12 +90,14 @@ class Named:
         tied: the first phrase that does not settle which robot is meant, or "".
         options: the text with each robot that fits `tied`; empty if there are too many.
         robots: the robots that fit `tied`.
+        example: the text with robots that may be meant, to see whether it makes sense.
     """
 
     words: str
     tied: str = ""
     options: tuple[str, ...] = ()
     robots: tuple[str, ...] = ()
+    example: str = ""
 
     @property
     def question(self) -> str:
@@ -97,7 +108,7 @@ class Named:
 
 def speaks_of_place(words: str) -> bool:
     """Return whether words may name a robot by where it stands."""
-    return any(pattern.search(words) for pattern in PHRASES)
+    return any(pattern.search(words) for pattern in (*PHRASES, NEAREST))
 
 
 def numbered(standing: Standing) -> Standing:
@@ -114,7 +125,7 @@ def meant_by_place(words: str, standing: Standing, clear: Callable[[str], bool])
     if robots.tied or clear(robots.words):
         return robots
     either = named(robots.words, standing, ones=True)
-    return either if clear((*either.options, either.words)[0]) else robots
+    return either if clear(either.example or either.words) else robots
 
 
 def named(words: str, standing: Standing, *, ones: bool) -> Named:
@@ -126,7 +137,7 @@ def named(words: str, standing: Standing, *, ones: bool) -> Named:
         ones: whether "the left one" is a robot too.
     """
     words = BOTH.sub(r"the \g<a> \g<noun> and the \g<b> \g<noun>", words)
-    for pattern in PHRASES:
+    for pattern in (*PHRASES, *_by_things(standing)):
         at = 0
         while (match := pattern.search(words, at)) is not None:
             said, at = match.groupdict(), match.end()
@@ -145,7 +156,7 @@ def named(words: str, standing: Standing, *, ones: bool) -> Named:
             texts = tuple(f"{words[: match.start()]}{p}{words[match.end() :]}" for p in put)
             if rivals or not chosen:
                 few = texts if 1 < len(texts) <= MOST_OFFERED else ()
-                return Named(words, match[0], few, tuple(fit))
+                return Named(words, match[0], few, tuple(fit), next(iter(texts), words))
             words, at = texts[0], match.start() + len(put[0])
     return Named(words)
 
@@ -175,6 +186,8 @@ def _ranked(
     need = AMOUNTS.get((said.get("n") or "").lower(), 1)
     skip = table_of("ordinals").get((said.get("rank") or "first").lower(), 1) - 1
     far = _scores(str(said["way"]).lower(), standing)
+    if said.get("far"):
+        far = {robot: -score for robot, score in far.items()}
     order = sorted(far, key=lambda robot: -far[robot])
     chosen = tuple(order[skip : skip + need])
     least = max(LEAST_APART, APART * (far[order[0]] - far[order[-1]]))
@@ -182,6 +195,30 @@ def _ranked(
     others = [robot for robot in order if robot not in chosen]
     rivals = tuple(r for r in others if any(abs(far[r] - end) < least for end in ends))
     return (chosen, rivals) if len(chosen) == need else ((), rivals)
+
+
+def _by_things(standing: Standing) -> tuple[re.Pattern[str], ...]:
+    """Return patterns for robots by how near they are to a thing: "the one nearest the tree"."""
+    names = [name for thing in standing.things for name in thing if _centre(name, standing)]
+    if not names or not standing.places:
+        return ()
+    way = rf"(?P<way>{'|'.join(map(re.escape, sorted(names, key=len, reverse=True)))})\b"
+    near = r"(?:(?:nearest|closest|next)(?: to)?|(?P<far>furthest|farthest)(?: away)?(?: from)?)"
+    return (
+        re.compile(rf"\b(?:the |that ){N}{NOUN} {STANDS}{near} (?:the )?{way}", re.IGNORECASE),
+        re.compile(
+            rf"\b(?:(?:whoever|whichever) is|the)(?: (?P<n>{'|'.join(AMOUNTS)}))?(?P<one>) "
+            rf"{near} (?:the )?{way}",
+            re.IGNORECASE,
+        ),
+    )
+
+
+def _centre(name: str, standing: Standing) -> tuple[float, float] | None:
+    """Return the centre of a thing by its id or label, px; None if it is no such name."""
+    centres = standing.centre or {}
+    ids = [t for t, label in standing.things if name.lower() in (t.lower(), label.lower())]
+    return centres.get(ids[0]) if len(ids) == 1 else None
 
 
 def _in_places(robots: Sequence[str]) -> list[str]:
@@ -197,6 +234,9 @@ def _scores(way: str, standing: Standing) -> dict[str, float]:
     x, y = (sum(at[k] for at in places.values()) / max(len(places), 1) for k in (0, 1))
     if re.fullmatch(MIDDLE, way):
         return {r: -(((at[0] - x) ** 2 + (at[1] - y) ** 2) ** 0.5) for r, at in places.items()}
+    centre = _centre(way, standing)
+    if centre is not None:
+        return {r: -math.dist(at, centre) for r, at in places.items()}
     ends = re.findall(rf"{END}|high|low", way)
     vectors = [TOWARDS[end] for end in ends]
     dx, dy = (sum(v[k] for v in vectors) for k in (0, 1))

@@ -16,8 +16,19 @@ from ..model import Request
 from .accounting import read_instruction
 from .answering import arrived
 from .besides import dropped, saying, without_besides
-from .choosing import Step, calls_in, located_reasons, names_things, prompts_of
+from .body_widths import with_widths
+from .choosing import Step, calls_in, candidate_notes, names_things, prompts_of
 from .conversing import conversed
+from .counting import (
+    FEWEST,
+    corner_count,
+    count_edit,
+    count_left_open,
+    counted,
+    counts_corners,
+    refused,
+    without_closure,
+)
 from .drafting import (
     contract_of,
     options_of,
@@ -45,7 +56,6 @@ ONE_AT_A_TIME = (
     "Those are formations one after the other, each from where robots arrived in the one before: "
     "only one can be planned without moving robots. Say that one alone."
 )
-USUAL_CORNERS = 4
 READING = "The rules account for every word; the rest of them says which thing is meant."
 """Answer to a doubt about the reading, which arises from single words."""
 
@@ -75,8 +85,11 @@ def _next_step(turn: History, before: History) -> Reply:
     """Return the next step of a turn that began with a task message; `before` are earlier ones."""
     first = turn[0]
     assert isinstance(first, User)
-    agreed = _without_agreed(turn)
-    return following(read_task(first.text), turn, lambda t: in_stages(t, agreed, before, _step_of))
+    sized = with_widths(read_task(first.text), _without_agreed(turn))
+    if isinstance(sized, Reply):
+        return sized
+    task, agreed = sized
+    return following(task, turn, lambda t: in_stages(t, agreed, before, _step_of))
 
 
 def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
@@ -93,6 +106,9 @@ def _step_of(task: Task, turn: History, before: History, later: bool) -> Reply:
     last = turn[-1]
     if isinstance(last, Result) and last.name == "propose_formation":
         return _after_proposal(task, last, turn, before)
+    if isinstance(last, Result) and last.name == "edit_formation":
+        plan = counted(last, turn)
+        return _planned_or_deployed(task, plan, turn) if plan else refused(last)
     if isinstance(last, Result) and last.name == "deploy":
         return Reply(text=_after_deploy(task, last, turn))
     if isinstance(last, Result) and last.error:
@@ -136,6 +152,8 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     shown, task = task.pointed, chosen
     reading = read_instruction(task.instruction, task.metres_per_pixel)
     reading = replace(reading, unread=[*still_open, *reading.unread])
+    if _given_count(task, history):
+        reading = replace(reading, count="")
     robots = _robot_count(task, reading, history)
     question = question_of(task, reading, robots)
     if not task.deploy and len(stages_of(replace(task, deploy=True))) > 1:
@@ -153,7 +171,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
     if not ids and task.standing:
         ids = stood_about(reading.things, Standing.of(task.standing))[:needed]
     prompts = labelled([p for p in shown if p["id"] not in task.targets], reading.things)
-    named = [] if others else [*reading.others, *([reading.faced] if reading.faced else [])]
+    named = [] if others else reading.named
     found = things_meant(task, reading, named, history, pointed=bool(ids))
     if isinstance(found, Step):
         return _call(found.name, found.arguments)
@@ -162,6 +180,7 @@ def _begin(task: Task, history: History, before: History) -> Reply:
         prompts = [*prompts, *looked_for]
         ids, others = _split_last([*ids, *(p["id"] for p in looked_for)], len(named))
     contract = _in_unit(task, contract_of(reading, robots, ids, others, _refusals(history)))
+    contract = without_closure(contract, count_left_open(reading))
     if _was_doubted(history):
         contract["reading"] = READING
     return _call("propose_formation", {"contract": contract, "targets": prompts})
@@ -277,21 +296,9 @@ def _standing_count(task: Task) -> int | None:
 def _robot_count(task: Task, reading: Reading, history: History) -> int | None:
     """Return how many robots are wanted; None where the person has to be asked."""
     wording = reading.robots or (reading.form.robots if reading.form else None)
-    robots = task.robots or wording or _number_answered(history) or _standing_count(task)
-    return robots or (_corner_count(history) if _counts_corners(reading) else None)
-
-
-def _counts_corners(reading: Reading) -> bool:
-    return reading.relation == "corners" and reading.one_a_corner and reading.robots is None
-
-
-def _corner_count(history: History) -> int | None:
-    """Return the corners of the thing's outline, which a first proposal measures; before that 4."""
-    measured = [m for m in history if isinstance(m, Result) and m.name == "propose_formation"]
-    if not measured or measured[-1].error:
-        return USUAL_CORNERS
-    target = json.loads(measured[-1].text)["targets"][0]
-    return int(target["corners"]) or None
+    robots = task.robots or wording or _given_count(task, history)
+    robots = robots or (corner_count(history) if counts_corners(reading) else None)
+    return robots or (FEWEST if count_left_open(reading) else None)
 
 
 def _label(wording: str) -> str:
@@ -313,15 +320,26 @@ def _after_proposal(task: Task, result: Result, history: History, before: Histor
             return _call("ask_user", {"question": facts.get("plain", result.text)})
         return _impossible(history, facts.get("plain", result.text), facts.get("partial_plan"))
     plan = json.loads(result.text)
-    reading = read_instruction(task.instruction, task.metres_per_pixel)
+    said = _restated_instruction(task, history).text
+    reading = read_instruction(said, task.metres_per_pixel)
     main = plan["robots"] - sum(count for _, count in reading.further)
-    counts = _counts_corners(reading) and main != _robot_count(task, reading, history)
+    counts = counts_corners(reading) and main != _robot_count(task, reading, history)
     if counts and not task.standing:
         return _begin(task, history, before)
     if not plan["certified"]:
         partial = plan.get("partial")
         reason = [*plan["findings"], *([partial["sentence"]] if partial else [])]
         return _impossible(history, " ".join(reason), (partial or plan)["plan_id"])
+    settling = None if _given_count(task, history) else count_edit(reading, result, plan)
+    return settling or _planned_or_deployed(task, plan, history)
+
+
+def _given_count(task: Task, history: History) -> int | None:
+    """Return the number of robots that was given apart from the instruction; None if none was."""
+    return task.robots or _number_answered(history) or _standing_count(task)
+
+
+def _planned_or_deployed(task: Task, plan: dict[str, Any], history: History) -> Reply:
     if task.deploy:
         return _call("deploy", {"plan_id": plan["plan_id"]})
     return Reply(text=f"{_planned(task, plan, history)} Nothing was moved.")
@@ -355,7 +373,7 @@ def _planned(task: Task, plan: dict[str, Any], history: History) -> str:
     noun = "robot has a certified place" if plan["robots"] == 1 else "robots have certified places"
     placed = f"{plan['robots']} {noun} (plan {plan['plan_id']})."
     return " ".join(
-        [*_candidate_notes(history), placed, *plan["notes"], *_reading_notes(task, history)]
+        [*candidate_notes(history), placed, *plan["notes"], *_reading_notes(task, history)]
     )
 
 
@@ -373,18 +391,6 @@ def _reading_notes(task: Task, history: History) -> list[str]:
 
 def _quoted(words: list[str]) -> str:
     return ", ".join(f'"{quote}"' for quote in dict.fromkeys(words))
-
-
-def _candidate_notes(history: History) -> list[str]:
-    """Return sentences on which candidates were taken for the things meant, and why."""
-    last = next(c for c in calls_in(history)[::-1] if c.name == "propose_formation")
-    reasons = located_reasons(history)
-    return [
-        f"Took {p['candidate']} for the {p.get('label') or 'thing chosen'}"
-        + (f": {'; '.join(reasons[p['candidate']])}." if reasons.get(p["candidate"]) else ".")
-        for p in last.arguments["targets"]
-        if p.get("candidate")
-    ]
 
 
 def _call(name: str, arguments: dict[str, Any]) -> Reply:

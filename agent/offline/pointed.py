@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -63,7 +63,8 @@ def using_pointed(task: Task, followup: Followup) -> Followup:
     It is a refusal if the words are not an instruction.
     """
     named = json.dumps(followup.edits)
-    if not followup.edits or any(json.dumps(p["id"]) in named for p in task.pointed):
+    used = any(json.dumps(p["id"]) in named or _places_at(p, followup) for p in task.pointed)
+    if used or not followup.edits:
         return followup
     reading = read_instruction(task.instruction, task.metres_per_pixel)
     if reading.sure and reading.relation != "ask" and not (reading.stops or reading.unread):
@@ -73,6 +74,15 @@ def using_pointed(task: Task, followup: Followup) -> Followup:
         "at with it. Say that, or say it again without pointing."
     )
     return Followup("refuse", text=text)
+
+
+def _places_at(prompt: Mapping[str, Any], followup: Followup) -> bool:
+    """Return whether an edit puts a robot at the point that was pointed at."""
+    points = prompt.get("points") or ()
+    return len(points) == 1 and any(
+        isinstance(at := edit.get("to"), (list, tuple)) and [*at] == [*points[0]]
+        for edit in followup.edits
+    )
 
 
 def labelled(prompts: list[dict[str, Any]], things: Sequence[str]) -> list[dict[str, Any]]:

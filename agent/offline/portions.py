@@ -3,10 +3,13 @@
 from collections.abc import Collection, Sequence
 from typing import Any
 
+from ...tools.formation.quantities import Quantity
 from .demands import Demand, Item
 from .drawn_forms import Form
 from .reading import Reading
 
+FARTHEST = 100_000.0
+"""Upper bound of a clearance that has none, px."""
 OPPOSITE = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
 LONG_SIDES = ("long", "longer", "short", "shorter")
 
@@ -14,8 +17,10 @@ LONG_SIDES = ("long", "longer", "short", "shorter")
 class Portions:
     """Rules that carry demands about parts of the team over into a reading."""
 
-    def __init__(self, items: Sequence[Item], reading: Reading) -> None:
-        self.items, self.reading = items, reading
+    def __init__(
+        self, items: Sequence[Item], reading: Reading, metres_per_pixel: float | None
+    ) -> None:
+        self.items, self.reading, self.scale = items, reading, metres_per_pixel
         self.per_side: Demand | None = None  # a count per side; how many sides is settled later
         self.some_sides: Demand | None = None
 
@@ -38,7 +43,10 @@ class Portions:
         return True
 
     def _groups(self, demand: Demand) -> bool:
-        sides, counts = dict.fromkeys(demand.sides), [q.whole or 0 for q in demand.numbers]
+        sides = dict.fromkeys(demand.sides)
+        counts = [q.whole or 0 for q in demand.numbers if not q.is_length]
+        if not self._distances(demand):
+            return False
         if demand.value == "each" and not any(n > 1 for n in counts):
             counts = [1] * len(sides)
         counts = counts or [0] * len(sides)
@@ -46,6 +54,38 @@ class Portions:
             return False
         self.reading.shares = list(zip(sides, counts, strict=True))
         return not all(counts) or self._robots_are(sum(counts))
+
+    def _distances(self, demand: Demand) -> bool:
+        """Read the distances of a team's parts; a single one that comes last is that of all."""
+        told: dict[int, Quantity] = {}
+        part = -1
+        for quantity in demand.numbers:
+            if not quantity.is_length:
+                part += 1
+            elif part in told or part < 0:
+                return False
+            else:
+                told[part] = quantity
+        if [*told] == [len(demand.sides) - 1]:
+            told = dict.fromkeys(range(len(demand.sides)), told[part])
+        return all(self._set_off(demand.sides[k], length) for k, length in told.items())
+
+    def _set_off(self, side: str, length: Quantity, bound: str = "") -> bool:
+        """Set the distance of the robots at a side; return False if they have another."""
+        px = (length.least, length.most) if not length.is_length else length.px(self.scale)
+        if px is None:
+            self.reading.unscaled.append(length.wording)
+        if px is None or px[0] < 0:
+            return False
+        least = 0.0 if bound == "most" else px[0]
+        distance = (least, FARTHEST if bound == "least" else max(px[1], least + 1))
+        return self.reading.distances.setdefault(side, distance) == distance
+
+    def _ones_aside(self, demand: Demand) -> bool:
+        """Read the distance of the robots at a side: "the left ones 20 px away"."""
+        named = demand.sides[0] in {side for side, _ in self.reading.shares}
+        length = demand.quantity
+        return named and length is not None and self._set_off(demand.sides[0], length, demand.bound)
 
     def _each_side(self, demand: Demand) -> bool:
         """Read a count per side: on both, on all four, or on as many as the robot count gives."""

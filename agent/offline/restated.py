@@ -12,6 +12,7 @@ from ...tools.formation.number_words import numbers_in
 from ..first_message import Task
 from .accounting import read_instruction
 from .amending import with_last_count
+from .counting import LEFT_TO_YOU
 from .reading import Reading
 from .several import shares
 from .spelling import normalized_instruction
@@ -71,6 +72,8 @@ def restated(task: Task, answers: Sequence[str]) -> Restated:
 
 def _with_answer(said: Restated, answer: str, scale: float | None) -> Restated:
     """Return the instruction with one more answer."""
+    if LEFT_TO_YOU.fullmatch(answer):
+        return replace(said, text=f"{said.text} with as many robots as needed")
     corrected = _corrected(said.text, answer)
     if corrected is not None:
         return replace(said, text=corrected)

@@ -71,7 +71,7 @@ def test_a_question_or_help_is_answered_and_the_question_stays_open(
         report = open_session.say(words).report
         assert report.status == "question"
         assert report.message.startswith(told)
-        assert report.message.endswith("How many robots? Say a number.")
+        assert report.message.endswith("How many robots? Say a number, or as many as needed.")
     done = open_session.say("5").report
     assert (done.status, len(done.positions or ())) == ("planned", 5)
 

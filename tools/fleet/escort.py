@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from ..errors import FleetError, ToolError
 from ..formation.checking.check import certify
-from ..formation.checking.finding import Finding
+from ..formation.checking.finding import KEEP_OUTS, Finding
 from ..formation.contract import Contract
 from ..formation.plan import Plan
 from ..formation.site import Site
@@ -46,7 +46,7 @@ GRACE = 0.5
 """Robots may be off what the contract allows for so many seconds on end."""
 UNSEEN = 1.0
 """The thing may be unseen for so many seconds; so may a robot at the beginning."""
-OUTSIDE = frozenset({"out_of_picture", "keep_out"})
+OUTSIDE = frozenset({"out_of_picture", *KEEP_OUTS})
 """Findings about what does not move with the thing, and is checked where it is."""
 FATAL = frozenset({"on_target"})
 """Findings that hold robots at once."""

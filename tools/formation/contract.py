@@ -214,6 +214,7 @@ class Contract(Value):
         robot_radius: 0 is a point.
         unit: of its lengths, where the picture has a scale; places are px.
         keep_out: ids no robot may stand on or drive over; other things are kept off where possible.
+        keep_out_clearance: how far from them the edges of robots stay.
         reading: why this is what is meant, where the words were held against it.
     """
 
@@ -221,6 +222,7 @@ class Contract(Value):
     robot_radius: Length = 0.0
     unit: Unit | None = None
     keep_out: tuple[str, ...] = ()
+    keep_out_clearance: Length = Field(default=0.0, exclude_if=lambda px: not px)
     reading: str = Field(default="", max_length=300)
 
     @model_validator(mode="after")

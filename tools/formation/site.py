@@ -99,12 +99,14 @@ class Site:
         return outline_of(seen)
 
     def solid(self, name: str, contract: Contract) -> Polygon:
-        """Return the part of a target that robots keep off.
+        """Return the part of a target that robots keep off, and of a keep-out what is too near.
 
         This includes its holes, except those in which another target lies with room.
         """
         others = [self.outlines[other] for other in contract.target_ids if other != name]
-        return closed(self.outlines[name].polygon, others)
+        region = closed(self.outlines[name].polygon, others)
+        kept = contract.keep_out_clearance if name in contract.keep_out else 0.0
+        return region.buffer(kept) if kept else region
 
     def frame(self, radius: float) -> Frame:
         """Return the frame in which robots of a radius, px, stand wholly inside the picture."""

@@ -82,6 +82,7 @@ def contract_in_pixels(contract: Contract, metres_per_pixel: float | None) -> Co
     update = {
         "groups": tuple(map(group_in_px, contract.groups)),
         "robot_radius": px(contract.robot_radius),
+        "keep_out_clearance": px(contract.keep_out_clearance),
         "unit": None if metres_per_pixel is None else "px",
     }
     converted = contract.model_copy(update=update)

@@ -159,7 +159,7 @@ def test_the_side_of_one_thing_that_faces_another() -> None:
         pytest.param("form a star with 10 robots", "Where are the robots to draw a star?"),
         ("spell A around it with 9 robots", "Where are the robots to draw the letters A?"),
         pytest.param("9 robots in a 3 by 4 grid inside it", "takes 12 robots, 9 were named"),
-        ("surround it with 6 robots, all facing the coin", '"all facing the coin"'),
+        ("surround it with 6 robots, all facing the coin", 'Which one is "the coin"?'),
         ("spell hello above it with 20 robots", "form"),
         ("form a heart around it with 20 robots", "form"),
         ("20 robots in a 3.5 by 4 grid inside it", '"in a 3.5 by 4 grid inside it"'),

@@ -125,9 +125,15 @@ def _check_keep_out(points: FloatArray, contract: Contract, site: Site, audit: A
         foreign = ~np.isin(groups, owners)  # a group's own target is checked by its own rule
         if not foreign.any():
             continue
-        distance = distances(site.solid(name, contract), points)
-        for i in np.flatnonzero(foreign & (distance <= contract.robot_radius)):
-            audit.find("keep_out", distance[i], contract.robot_radius, robot=i, about=name)
+        plain = contract.model_copy(update={"keep_out_clearance": 0.0})
+        distance = distances(site.solid(name, plain), points)
+        kept = contract.keep_out_clearance if name in contract.keep_out else 0.0
+        least = contract.robot_radius + kept
+        near = distance < least - TOLERANCE if kept else distance <= least
+        for i in np.flatnonzero(foreign & near):
+            off = distance[i] > contract.robot_radius
+            kind = "keep_out_near" if off else "keep_out"
+            audit.find(kind, distance[i] - off * contract.robot_radius, kept, robot=i, about=name)
 
 
 def _check_outside(part: Part, audit: Audit) -> None:

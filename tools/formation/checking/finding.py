@@ -12,6 +12,8 @@ from ..units import length_text
 from ..value import Value
 
 _TEXTS = json.loads(resources.files(__package__ or "").joinpath("findings.json").read_text("utf-8"))
+KEEP_OUTS = frozenset(("keep_out", "keep_out_near"))
+"""Kinds of findings about what robots are to keep off."""
 SENTENCES: dict[str, str] = _TEXTS["sentences"]
 """The sentence template of every kind of finding."""
 REMEDIES: dict[str, tuple[str, str]] = _TEXTS["remedies"]

@@ -94,9 +94,13 @@ class Draft:
         if not left:
             raise ToolError("Nobody would be left: at least one robot has to stay.")
         stands = [Stand(part.group, part.points) for part in left]
-        keep_out = self.contract.keep_out
+        contract = self.contract
+        kept = {
+            "keep_out": contract.keep_out,
+            "keep_out_clearance": contract.keep_out_clearance,
+        }
         beside = (tuple(stands[:k] + stands[k + 1 :]) for k in range(len(left)))
-        whole = [replace(p, beside=b, keep_out=keep_out) for p, b in zip(left, beside, strict=True)]
+        whole = [replace(p, beside=b, **kept) for p, b in zip(left, beside, strict=True)]
         return replace(self, parts=tuple(whole))
 
     def with_each(self, chosen: Collection[int], rule: Callable[[Part], Part]) -> "Draft":

@@ -235,10 +235,11 @@ class Heading(_GroupEdit):
 
 
 class KeepOff(_Edit):
-    """Further things that no robot may stand on or drive over."""
+    """Further things that no robot may stand on or drive over, nor come nearer to than px."""
 
     kind: Literal["keep-out"] = "keep-out"
     ids: tuple[str, ...] = Field(min_length=1)
+    px: Positive | None = None
 
 
 _NAMES = (
@@ -255,7 +256,7 @@ EDIT_SCHEMA: dict[str, Any] = {
         "skip: robots; places stay empty. side: all to it. sides: only or without, lists. opening: "
         "towards, px wide or factor. close, open, escape-proof. arrange: demands, fields of a "
         "group. target: to an id; only robots (a count or numbers), the rest stay. merge. place: "
-        "robot to [x, y], by [dx, dy] or target. heading: to. keep-out: ids. group: else all."
+        "robot to [x, y], by [dx, dy] or target. heading: to. keep-out: ids, px. group: else all."
     ),
     "properties": {"kind": {"type": "string"}, **{name: {} for name in _NAMES}},
     "required": ["kind"],

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from ...geometry.outline import FloatArray, distances
+from ..checking.finding import KEEP_OUTS
 from ..encounters import TOUCHING, others_than
 from ..placement.avoidance import MOST_ROBOTS, MOST_TRIED, TRIED_TOGETHER, off_others
 from ..placement.caging import escape_proof
@@ -48,7 +49,7 @@ def off_things(plan: Plan, draft: Draft, before: FloatArray, kinds: Collection[s
     outlines = {name: draft.site.outlines[name] for name in contract.target_ids}
     others = others_than(contract, outlines, draft.site.others)
     site, failed = replace(draft.site, others=others), {f.kind for f in plan.verdict.findings}
-    sound = contract.robots <= MOST_ROBOTS and not failed - {"keep_out"}
+    sound = contract.robots <= MOST_ROBOTS and not failed - KEEP_OUTS
     if EXACT.issuperset(kinds) or not sound or any(map(escape_proof, contract.groups)):
         return plan
     moved = (was < 0) | (np.linalg.norm(plan.formation.points - before[was], axis=1) > 0)
@@ -132,7 +133,7 @@ class _Slides:
         for way in islice(better, max(self._left, 0)):
             self._left -= 1
             plan = make_plan(formation.contract, self._site, formation.scene_version, way)
-            if not {f.kind for f in plan.verdict.findings} - {"keep_out"}:
+            if not {f.kind for f in plan.verdict.findings} - KEEP_OUTS:
                 self._best = plan
                 return
 

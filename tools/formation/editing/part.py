@@ -40,6 +40,7 @@ class Part:
         radius: radius of a robot, px.
         beside: the other groups, which new places keep clear of.
         keep_out: ids of what no robot may stand on.
+        keep_out_clearance: how far from that the edges of robots stay, px.
     """
 
     group: Group
@@ -49,6 +50,7 @@ class Part:
     radius: float
     beside: tuple[Stand, ...] = ()
     keep_out: tuple[str, ...] = ()
+    keep_out_clearance: float = 0.0
 
     def to(self, points: FloatArray, **update: object) -> "Part":
         """Return the group with its robots at other places, and other values of some fields."""
@@ -131,7 +133,8 @@ class Part:
         group = self.valid_group(**update, robots=count)
         others = tuple(stand.group for stand in self.beside)
         alone = Contract(groups=(group,), robot_radius=self.radius)
-        contract = alone.model_copy(update={"groups": (group, *others), "keep_out": self.keep_out})
+        kept = {"keep_out": self.keep_out, "keep_out_clearance": self.keep_out_clearance}
+        contract = alone.model_copy(update={"groups": (group, *others), **kept})
 
         def sound(group: Group, points: FloatArray) -> bool:
             return replace(self, group=group, points=points).certified

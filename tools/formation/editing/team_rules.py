@@ -255,7 +255,8 @@ def _kept_off(draft: Draft, edit: KeepOff) -> Draft:
     for name in edit.ids:
         check_known(name, draft.site)
     keep_out = tuple(dict.fromkeys((*draft.contract.keep_out, *edit.ids)))
-    contract = draft.contract.model_copy(update={"keep_out": keep_out})
+    kept = {} if edit.px is None else {"keep_out_clearance": edit.px}
+    contract = draft.contract.model_copy(update={"keep_out": keep_out, **kept})
     return replace(draft, contract=contract).with_parts(draft.parts)
 
 

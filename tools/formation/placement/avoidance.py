@@ -14,6 +14,7 @@ from ...errors import InputError, ToolError
 from ...geometry.curves import Curve, interpolate
 from ...geometry.outline import FloatArray, distances
 from ...geometry.sampling import nearest
+from ..checking.finding import KEEP_OUTS
 from ..contract import Group, nominal
 from ..encounters import TOUCHING, room_of
 from ..plan import Plan, make_plan
@@ -51,7 +52,7 @@ def off_others(plan: Plan, site: Site) -> Plan:
     kinds = {finding.kind for finding in plan.verdict.findings}
     contract = plan.formation.contract
     costly = contract.robots > MOST_ROBOTS or any(map(escape_proof, contract.groups))
-    if kinds - {"keep_out"} or not (site.others or kinds or contract.keep_out) or costly:
+    if kinds - KEEP_OUTS or not (site.others or kinds or contract.keep_out) or costly:
         return plan
     search, first = _Search(plan, site), 0
     for group in contract.groups:

@@ -301,6 +301,26 @@ def test_a_ring_of_a_cage_that_lets_the_thing_through_sideways_says_so() -> None
         assert any("wider than t1" in note for note in notes) is noted
 
 
+def test_robots_keep_a_distance_from_what_is_kept_free() -> None:
+    outlines = {"t1": square(100, 100, 160, 160), "t2": square(240, 100, 280, 160)}
+    site = Site(outlines, WIDTH, HEIGHT)
+    ring = Group(relation="around", targets=("t1",), robots=8, clearance=(20, 80))
+    for far, certified in ((10.0, True), (60.0, False)):
+        kept = Contract(groups=(ring,), robot_radius=4, keep_out=("t2",), keep_out_clearance=far)
+        contract = with_defaults(kept, site.outlines, site.room)
+        points = np.array([(x, y) for x in (65, 130, 195) for y in (65, 130, 195)])
+        points = np.delete(points, 4, axis=0).astype(float)
+        found = certify(points, contract, site).findings
+        near = [f for f in found if f.kind == "keep_out_near"]
+        assert (not near) is certified
+        if near:
+            assert near[0].sentence.endswith(
+                "which is to be kept free; 60.0 px or more are needed."
+            )
+            assert near[0].robot == 6
+            assert near[0].value == pytest.approx(math.hypot(45, 35) - 4, abs=1)
+
+
 def test_robots_at_points_are_held_to_them_to_keep_outs_and_to_each_other() -> None:
     site = Site({"t1": square(300, 200, 400, 300)}, WIDTH, HEIGHT)
     around = Group(relation="around", targets=("t1",), robots=4)
