@@ -4,6 +4,7 @@ Each word is taken by one rule, refers to a thing, is a known word of the comman
 that is quoted back to the person, or is left unread: then the planner quotes it and asks.
 """
 
+import re
 from collections.abc import Iterable, Sequence
 
 from .barring import MAY_BE, Barring
@@ -43,6 +44,9 @@ STATING = frozenset(
 VAGUE = {"nobody", "area"}
 """Classes of everyday words: a sentence with no others does not name an arrangement."""
 WITHIN = frozenset(PLACES["inside"])
+ON_A_SIDE = re.compile(
+    r"\b(?:on|to|at|from) (?:the |its )?(?:left|right|top|bottom)$", re.IGNORECASE
+)
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
 """Words that make a distance one to keep outside the thing."""
 
@@ -239,12 +243,21 @@ class _Reader:
                     self.taken[k] = False
                 elif says_others(phrase):
                     self.reading.background.append(phrase)
-                elif demands_more(phrase, self.reading.relation) or (
-                    self.reading.things and not may_open(first)
+                elif (
+                    demands_more(phrase, self.reading.relation)
+                    or (self.reading.things and not may_open(first))
+                    or self._says_where(k, phrase)
                 ):
                     self.reading.unread.append(phrase)
                 else:
                     self.reading.things.append(phrase)
+
+    def _says_where(self, k: int, phrase: str) -> bool:
+        """Return whether one of several phrases may say the side of a row that has none yet."""
+        reading, others = self.reading, [i for i in self.items if i.symbol == "<t>"]
+        rows = reading.relation == "along" and "side" not in reading.group and not reading.faced
+        later = self.items[k] is not others[-1]
+        return rows and len(others) > 1 and later and ON_A_SIDE.search(phrase) is not None
 
     def _place(self) -> str:
         """Return where a form is drawn, by the word before the thing; "" where it does not say."""

@@ -17,10 +17,11 @@ from . import (
     followup_teams,
     followup_turns,
 )
+from .followup_chunks import Chunk
 from .followup_edits import Effect, Effects, Utterance, ask
 from .followup_frames import Frame, Slots, frames
 from .followup_things import resolved
-from .followup_words import Chunk, chunks_of, rules
+from .followup_words import chunks_of, rules
 from .spelling import spelled
 from .standing import Standing
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from .clauses import Line
 from .followup import Followup
-from .followup_words import Chunk
+from .followup_chunks import Chunk
 from .followups import read_followup
 from .standing import Standing
 

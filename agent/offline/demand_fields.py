@@ -233,7 +233,12 @@ class Fields(OtherThings):
         return "opening" in self.reading.group or "opening_towards" in self.reading.group
 
     def _purpose(self, demand: Demand) -> bool:
-        return self._left_alone(demand)
+        """Note why as background, where the words say how as well."""
+        prevents = any(self.items[k].symbol == "from" for k in range(demand.first, demand.last))
+        if prevents and self.reading.relation == "cage":
+            return True  # that is what a cage is for
+        said = self.reading.relation in ("between", "along", "around", "corners")
+        return (said or not prevents) and self._left_alone(demand)
 
     def _all_of(self, demand: Demand) -> bool:
         return self.reading.relation == "inside"

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...tools.formation.number_words import SMALL, TENS
+from .followup_chunks import Chunk
 from .followup_frames import Slots
-from .followup_words import Chunk
 from .phrases import phrase
 from .standing import Standing
 
@@ -212,7 +212,7 @@ def rotate(slots: Slots, said: Utterance) -> Effects:
         if name in slots:
             degrees = float(slots[name][0])
     if "num" in slots and STEP.search(said.words):
-        degrees *= 360 / said.count  # "one place clockwise"
+        degrees *= 360 / max(said.count, 1)  # "one place clockwise"
     sign = -1 if "ccw" in directions else 1
     last = _of_kind(said.last, "rotate")
     if "otherway" in slots or "back" in slots:
@@ -286,6 +286,12 @@ def snug(slots: Slots, said: Utterance) -> Effects:
     factor = factor_of(slots)
     wide = slots["snug"][0] == "wide"
     return [{"kind": "spacing", "factor": rounded(factor if wide else 1 / factor)}]
+
+
+def tightfit(slots: Slots, said: Utterance) -> Effects:
+    """Draw the robots in to the distance that a tight fit has: "as close as you can"."""
+    slots.has("all", "radial", "again")
+    return [{"kind": "arrange", "demands": {"fit": "tight", "clearance": None}}]
 
 
 def heading(slots: Slots, said: Utterance) -> Effects:

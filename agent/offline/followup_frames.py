@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from .followup_words import Chunk, rules
+from .followup_chunks import Chunk
+from .followup_words import rules
 
 
 class Slots(dict[str, list[Any]]):

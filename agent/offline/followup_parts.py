@@ -92,6 +92,24 @@ def allotted(slots: Slots, said: Utterance) -> Effects:
     return _moved(dict(pairs), groups, said, each=each)
 
 
+def handed(slots: Slots, said: Utterance) -> Effects:
+    """Move so many robots from one team to another: "one from the first coin to the second"."""
+    standing = said.standing
+    slots.used.update(slots)
+    groups = {str(g["targets"][0]): k for k, g in enumerate(standing.groups, 1) if _is_about_one(g)}
+    kinds = [c.kinds for c, _ in said.phrases]
+    named = [
+        ("thing", k.get("thing", k.get("current"))) for k in kinds if {"thing", "current"} & {*k}
+    ]
+    named += [("other", k["other"]) for k in kinds if "other" in k]
+    things = _resolved_things(named, said, list(groups))
+    n = whole(slots)
+    if things is None or len(things) != 2 or things[0] not in groups or n is None:
+        return None
+    group = {"group": groups[things[0]]} if len(groups) > 1 else {}
+    return [{"kind": "target", "to": things[1], "robots": n, **group}]
+
+
 def split_among(slots: Slots, said: Utterance) -> Effects:
     """Put as many robots at each of all things known: "split them over all three"."""
     standing = said.standing

@@ -139,7 +139,8 @@ def count(slots: Slots, said: Utterance) -> Effects:
     if n is not None and n > MAX_ROBOTS:
         return refuse(f"{n:,} robots are too many; at most {MAX_ROBOTS:,} can be placed.")
     if n == said.count:
-        return [{"kind": "talk", "about": "already"}]
+        many = "toomany" in slots
+        return how_many_fewer(slots, said) if many else [{"kind": "talk", "about": "already"}]
     of_distance = bool(said.last) and said.last[-1]["kind"] in ("distance", "out", "in")
     if n and n > 2 * said.count and of_distance and "robotword" not in slots:
         return ask(f"{n} of what?", f"{n} px away from it", f"{n} robots")

@@ -4,8 +4,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from .followup_chunks import Chunk
 from .followup_edits import SIDE_OF, listed
-from .followup_words import Chunk
 from .phrases import phrase as thing_phrase
 from .phrases import table
 from .reading import unscaled
@@ -24,6 +24,14 @@ def pointing_at(words: str) -> str:
     return words if shown else re.sub(r"\bit\b", "this", words, count=1)
 
 
+GOING = re.compile(
+    r"^(?!.*\b(?:back|undo|again)\b).*\b(?:all|everyone|everybody|them|robots?|half|two|three)\b.* "
+    r"(?:to|around|round|at) $",
+    re.IGNORECASE,
+)
+"""Words before "the first one" with which it is a thing that robots go to, and no plan."""
+
+
 def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     """Return a phrase with a known thing as its id; a target of the plan becomes `current`."""
     kinds = dict(chunk.kinds)
@@ -37,6 +45,8 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     one = "first" in kinds and text[chunk.start : chunk.end].lower().endswith(" one")
     if one and len(standing.things) > 1:  # "the first one" may be a plan or a thing
         kinds["thing"] = standing.things[0][0]
+        if GOING.search(text[: chunk.start]):
+            del kinds["first"]
     if "thing" in kinds:
         another = re.search(r"\banother $", text[: chunk.start], re.IGNORECASE)
         other = bool(kinds.pop("other", False) or another)

@@ -5,8 +5,8 @@ the frame that takes it decides. A word of no kind is "unknown", so that the per
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -16,6 +16,7 @@ import yaml
 from ...tools.formation.number_words import SMALL
 from ...tools.formation.quantities import Quantity, quantities_in
 from .descriptions import Description
+from .followup_chunks import Chunk, in_context
 from .lexicon import fillers
 from .phrases import HEADS, table
 from .phrases import phrase as thing_phrase
@@ -33,23 +34,9 @@ NUMBERED = re.compile(
 )
 ARTICLES = frozenset(("the", "a", "an"))
 NOT_PLACING = frozenset(("to", "of", "about", "each", "every"))
-WHO = frozenset(("team", "robots", "portion", "rest", "vague", "lone"))
 EACH, PART = ("one", "ones"), ("even", "odd")
 PRONOUNS = frozenset(("them", "it", "they", "us", "you"))
 SIDE_WORDS = ("left", "right", "top", "bottom", "upper", "lower", "leftmost", "rightmost", "middle")
-
-
-@dataclass(frozen=True)
-class Chunk:
-    """A phrase: its kinds, each with its value, and its start and end in characters.
-
-    Kinds beside those of followups.yaml: robots (numbers), num, px, m, angle, share, point, thing
-    (its words, or an id), team, it, filler, sep, correction, unknown.
-    """
-
-    kinds: Mapping[str, Any]
-    start: int
-    end: int
 
 
 @dataclass(frozen=True)
@@ -73,21 +60,7 @@ def chunks_of(text: str, standing: Standing) -> tuple[Chunk, ...]:
     while at < len(words):
         chunk, at = reader.read(at)
         found.append(chunk)
-    return tuple(_in_context(found, standing))
-
-
-def _in_context(chunks: Sequence[Chunk], standing: Standing) -> Iterator[Chunk]:
-    """Drop kinds that a phrase cannot be where it stands.
-
-    "All around" is not "about", and who waits corrects nothing; "both" are teams if there are two.
-    """
-    for k, chunk in enumerate(chunks):
-        last = not chunks[k + 1 :] or not {"sep", "it"}.isdisjoint(chunks[k + 1].kinds)
-        wrong = {"about"} if "relation" in chunk.kinds and last else set[str]()
-        who = {*chunks[k - 1].kinds} if k else set[str]()
-        wrong |= set() if WHO.isdisjoint(who) else {"correction"}
-        wrong |= {"team"} if "each" in chunk.kinds and len(standing.groups) < 2 else set()
-        yield replace(chunk, kinds={k: v for k, v in chunk.kinds.items() if k not in wrong})
+    return tuple(in_context(found, standing))
 
 
 class _Reader:

@@ -17,13 +17,14 @@ from .drafting import contract_of
 from .drawn_forms import form_in
 from .escorting import without_follow
 from .followup import Followup, Kind
+from .followup_chunks import Chunk
 from .followup_edits import Effect, listed
 from .followup_go import with_sure_go
 from .followup_last import RELATIVE, corrected
 from .followup_places import meant_by_place, numbered
 from .followup_recent import all_or_those, with_numbers
 from .followup_things import impossible
-from .followup_words import Chunk, rules, word_set
+from .followup_words import rules, word_set
 from .spelling import spelled
 from .standing import Standing
 

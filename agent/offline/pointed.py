@@ -14,8 +14,9 @@ from .accounting import read_instruction
 from .choosing import Step
 from .finding import one_at
 from .followup import Followup
+from .followup_chunks import Chunk
 from .followup_things import UNNAMED, resolved
-from .followup_words import Chunk, chunks_of
+from .followup_words import chunks_of
 from .references import Reference, described
 from .standing import Standing
 
