@@ -18,8 +18,10 @@ from .followup_words import table_of
 from .standing import Standing
 
 AMOUNTS = {"two": 2, "2": 2, "three": 3, "3": 3, "four": 4, "4": 4}
-LEAST_APART, APART = 1.0, 0.02
-"""Robots closer than this in px, or as a share of the whole extent, tie for a place."""
+LEAST_APART, APART, NEAR_APART = 1.0, 0.02, 0.15
+"""Robots closer than this in px, or as a share of the whole extent, tie; third: near a thing."""
+CLEARLY = 0.2
+"""Share of the whole extent by which robots on a side are further there than any others."""
 MOST_OFFERED = 12
 TOWARDS = {
     **dict.fromkeys(("left", "west"), (-1, 0)),
@@ -60,11 +62,15 @@ PHRASES = tuple(
         r"(?=\W*$|[,;.]| (?:[0-9]+|an? |by |should|must|has|further|farther|closer|out|in|up|down|"
         r"away|to|from|is|goes|and (?:the|robot))\b)",
         rf"\bthe (?P<rank>{RANKS})(?P<one>) from (?:the )?(?P<way>{END})\b{CORNER}",
+        rf"\b(?:everyone|everybody|anyone|those|all (?:of them|the {BOT}s)?)(?P<many>) {STANDS}"
+        rf"(?:{NEAR}|{AT})(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
         rf"\bthe (?P<n>{'|'.join(AMOUNTS)})(?P<one>) {STANDS}(?:{NEAR}|{AT})"
         rf"(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
     )
 )
 """Phrases for robots by where they stand; with the group `one`, for robots or things."""
+SAYS_ALL = re.compile(r"\b(?:everyone|everybody|all|only|just)\b", re.IGNORECASE)
+"""Words with which a side may be where all robots are to stand."""
 NEAREST = re.compile(
     r"\b(?:the|that|whoever|whichever)\b.*\b(?:nearest|closest|next|furthest|farthest)\b",
     re.IGNORECASE,
@@ -102,6 +108,8 @@ class Named:
     @property
     def question(self) -> str:
         """The question which of the robots that fit is meant."""
+        if len(self.options) == 1:
+            return f'Which robots are "{self.tied}"? By where they stand {listed(self.robots)}.'
         fitting = f'"{self.tied}" fits {listed(self.robots)} alike'
         return f"Which robot is meant? {fitting}: name it by its number."
 
@@ -122,6 +130,9 @@ def numbered(standing: Standing) -> Standing:
 def meant_by_place(words: str, standing: Standing, clear: Callable[[str], bool]) -> Named:
     """Return words with robots numbered; "the top one" is a robot if they are `clear` only then."""
     robots = named(words, standing, ones=False)
+    several = robots.words != words or (robots.tied and len(robots.options) == 1)
+    if several and SAYS_ALL.search(words) and clear(words):  # "everyone on the left"
+        return Named(words)
     if robots.tied or clear(robots.words):
         return robots
     either = named(robots.words, standing, ones=True)
@@ -142,10 +153,17 @@ def named(words: str, standing: Standing, *, ones: bool) -> Named:
         while (match := pattern.search(words, at)) is not None:
             said, at = match.groupdict(), match.end()
             thing = said.get("one") is not None
-            some = str(said.get("many") or said.get("one") or "").endswith("s")
-            if (some and not said.get("n")) or (
-                thing and (not ones or LED.search(words[: match.start()].lower()))
-            ):
+            some = said.get("many") is not None or str(said.get("one") or "").endswith("s")
+            if thing and (not ones or LED.search(words[: match.start()].lower())):
+                continue
+            if some and not said.get("n"):
+                there, sure = _on_a_side(str(said["way"]).lower(), standing)
+                if not there or said.get("which"):
+                    continue
+                text = f"{words[: match.start()]}{_called(there)}{words[match.end() :]}"
+                if not sure:
+                    return Named(words, match[0], (text,), there, text)
+                words, at = text, match.start() + len(_called(there))
                 continue
             chosen, rivals = _ranked(said, standing)
             lead = "where is " if said.get("which") else ""
@@ -190,7 +208,8 @@ def _ranked(
         far = {robot: -score for robot, score in far.items()}
     order = sorted(far, key=lambda robot: -far[robot])
     chosen = tuple(order[skip : skip + need])
-    least = max(LEAST_APART, APART * (far[order[0]] - far[order[-1]]))
+    near = _centre(str(said["way"]), standing) is not None  # its extent is not known here
+    least = max(LEAST_APART, (NEAR_APART if near else APART) * (far[order[0]] - far[order[-1]]))
     ends = [far[robot] for robot in (*chosen[:1], *chosen[-1:])]
     others = [robot for robot in order if robot not in chosen]
     rivals = tuple(r for r in others if any(abs(far[r] - end) < least for end in ends))
@@ -219,6 +238,28 @@ def _centre(name: str, standing: Standing) -> tuple[float, float] | None:
     centres = standing.centre or {}
     ids = [t for t, label in standing.things if name.lower() in (t.lower(), label.lower())]
     return centres.get(ids[0]) if len(ids) == 1 else None
+
+
+def _on_a_side(way: str, standing: Standing) -> tuple[tuple[str, ...], bool]:
+    """Return the robots whose way from the middle of all is nearest to a side's, and if surely."""
+    places, ends = standing.places or {}, re.findall(END, way)
+    if len(ends) != 1 or not places:
+        return (), False
+    x, y = (sum(at[k] for at in places.values()) / len(places) for k in (0, 1))
+    dx, dy = TOWARDS[ends[0]]
+    off = {r: (at[0] - x, at[1] - y) for r, at in places.items()}
+    there = [
+        r for r, (a, b) in off.items() if a * dx + b * dy > abs(a * dy) + abs(b * dx) - LEAST_APART
+    ]
+    far = {r: a * dx + b * dy for r, (a, b) in off.items()}
+    there = [r for r in there if far[r] > LEAST_APART]
+    if len(there) < 2:  # of a few robots, or of a row across it
+        there = [r for r in far if far[r] > max(LEAST_APART, max(far.values()) / 2)]
+    if len(there) in (0, len(places)):
+        return (), False
+    others = max(score for r, score in far.items() if r not in there)
+    apart = min(far[r] for r in there) - others
+    return tuple(there), apart > CLEARLY * (max(far.values()) - min(far.values()))
 
 
 def _in_places(robots: Sequence[str]) -> list[str]:

@@ -74,6 +74,13 @@ class Hall(Simulated[Faulty]):
         self.link(everything, heard=lambda topic, text: said.append((topic, json.loads(text))))
         return said
 
+    def all_of(self, said: list[tuple[str, dict[str, Any]]]) -> list[tuple[str, dict[str, Any]]]:
+        """What was overheard, once all that was said before now has come."""
+        mark = f"{self.settings.interface}/mark"
+        self.link().say(mark, {})
+        wait_for(lambda: any(topic == mark for topic, _ in said))
+        return [(topic, message) for topic, message in said if topic != mark]
+
     def end(self) -> None:
         super().end()
         for link in self._links:

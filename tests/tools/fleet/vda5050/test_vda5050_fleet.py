@@ -27,7 +27,7 @@ def test_vehicles_look_where_a_plan_says_and_the_last_node_alone_says_so(
     said = there.overhear()
     there.simulate()
     check_headings(there)
-    orders = [message for topic, message in said if topic.endswith("a/order")]
+    orders = [message for topic, message in there.all_of(said) if topic.endswith("a/order")]
     first = [order for order in orders if order["orderId"] == orders[0]["orderId"]]
     nodes = [order["nodes"][-1]["nodePosition"] for order in first]
     with_theta = [i for i, node in enumerate(nodes) if "theta" in node]

@@ -43,7 +43,7 @@ def test_a_vehicle_that_has_heard_is_not_told_again(hall: Halls) -> None:
     assert standing
     told = [
         [act["actionType"] for act in message["actions"]]
-        for topic, message in said
+        for topic, message in there.all_of(said)
         if topic.endswith("a/instantActions")
     ]
     pauses = ["startPause", "cancelOrder"], ["stopPause"]

@@ -51,7 +51,7 @@ def test_all_that_is_said_is_valid_and_orders_go_on_bit_by_bit(hall: Halls, vers
     drive(there, [(250, 50), (250, 150)])
     assert np.allclose(there.robots.points[0], (250, 150), atol=1)
     kinds: dict[str, list[Json]] = defaultdict(list)
-    for topic, message in [*said]:
+    for topic, message in there.all_of(said):
         interface, level, maker, serial, kind = topic.split("/")
         assert (interface, level, maker) == (there.settings.interface, f"v{version[0]}", "KIT")
         assert not mistake(version, kind, message), (kind, message)
@@ -82,7 +82,11 @@ def test_after_a_stop_nothing_is_sent_but_what_ends_the_order(hall: Halls) -> No
         drive(there, [(500, 50)], stop_after=8)
     vehicle = there.robots.vehicles["a"]
     until(lambda: vehicle.cancelled and not vehicle.paused)
-    sent = [(t.split("/")[3:], m) for t, m in said if t.endswith(("order", "instantActions"))]
+    sent = [
+        (t.split("/")[3:], m)
+        for t, m in there.all_of(said)
+        if t.endswith(("order", "instantActions"))
+    ]
     told = [
         [action["actionType"] for action in message["actions"]] or kind
         for (robot, kind), message in sent
@@ -199,7 +203,11 @@ def test_a_vehicle_whose_state_is_not_known_is_asked_and_not_seen_before(
     with pytest.raises(StalePosesError, match="Robot b not seen yet") as lost:
         asyncio.run(fleet.observe())
     assert lost.value.ids == ("b",)
-    asked = [m["actions"][0]["actionType"] for t, m in said if t.endswith("b/instantActions")]
+    asked = [
+        m["actions"][0]["actionType"]
+        for t, m in there.all_of(said)
+        if t.endswith("b/instantActions")
+    ]
     assert asked and set(asked) == {"stateRequest"}
     asyncio.run(fleet.close())
 
