@@ -23,6 +23,8 @@ MOST_MEMBERS = 60
 """The most things of a group."""
 COVERED = 0.5
 """A thing that lies this far in another is that thing, or a part of it."""
+TOUCHED = 0.05
+"""A note names a thing that lies at least this far in what was made."""
 NAMED = 8
 """The most other things that a note names."""
 
@@ -102,12 +104,13 @@ def _derived(
 ) -> tuple[Outline, str]:
     """Return the outline and what is to be known of it."""
     outlines = [m.outline for m in members]
-    ids = " and ".join(m.id for m in members)
+    *most, last = (m.id for m in members)
+    ids = f"{', '.join(most)} and {last}" if most else last
     things = _other_things(context, members)
     if kind == "group":
         outline, which = grouped(outlines)
         among = _named_within(things, outline.filled)
-        taken = f" It takes in {among} too." if among else ""
+        taken = f" It reaches over {among} too." if among else ""
         return outline, f"Its outline is the {which} of {ids}.{taken}"
     if kind == "part":
         half = next(p for p in get_args(PartName) if p == where)
@@ -149,7 +152,7 @@ def _is_one(region: BaseGeometry, own: BaseGeometry) -> bool:
 
 
 def _named_within(things: Sequence[tuple[str, Polygon]], region: BaseGeometry) -> str:
-    """Name the things of which most lies in a region."""
-    found = [name for name, thing in things if _is_one(thing, region)]
+    """Name the things that reach into a region."""
+    found = [n for n, thing in things if region.intersection(thing).area > TOUCHED * thing.area]
     rest = len(found) - NAMED
     return ", ".join(found[:NAMED]) + (f" and {rest} more" if rest > 0 else "")

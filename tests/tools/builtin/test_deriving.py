@@ -48,7 +48,7 @@ def test_a_group_is_one_target_and_says_which_outline(work: "ToolCalls") -> None
     assert made["box"] == pytest.approx([79.5, 59.5, 439.5, 159.5], abs=2)
     green = candidate(work, "green")
     assert made["note"] == (
-        f"Its outline is the convex hull of t1 and t2. It takes in {green} too."
+        f"Its outline is the convex hull of t1 and t2. It reaches over {green} too."
     )
     group = {"relation": "around", "targets": ["t9"], "robots": 12}
     plan = work.call("propose_formation", contract={"groups": [group]})
