@@ -116,7 +116,7 @@ def _derived(
         half = next(p for p in get_args(PartName) if p == where)
         part = part_of(outlines[0], half)
         share = round(100 * part.area / outlines[0].area)
-        said = f"It is {share} % of {ids}; name {ids} in keep_out unless robots may stand on it."
+        said = f"{share} % of {ids}; robots keep off the rest only where it is in keep_out."
         return part, f"Cut by geometry alone: {said}"
     regions = [region for _, region in things]
     if kind == "gap":

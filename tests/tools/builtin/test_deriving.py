@@ -87,7 +87,7 @@ def test_a_part_is_cut_by_geometry_and_says_so(work: "ToolCalls") -> None:
     made = derived(work, "part", "t1", where="left half")
     assert made["label"] == "the left half of red box"
     assert made["box"] == pytest.approx([79.5, 59.5, 129.5, 159.5], abs=2)
-    assert made["note"].startswith("Cut by geometry alone: It is 50 % of t1;")
+    assert made["note"].startswith("Cut by geometry alone: 50 % of t1;")
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
