@@ -96,15 +96,18 @@ def finding_table(by_suite: Mapping[str, Sequence[Search]]) -> str:
     for suite, made in by_suite.items():
         there, absent = [s for s in made if s.present], [s for s in made if not s.present]
         shares = [
-            _share([s.found for s in there]),
-            _share([s.found and s.settled for s in there]),
-            _share([s.settled and not s.found for s in there]),
+            _held_share([s.found for s in there]),
+            _held_share([s.found and s.settled for s in there]),
+            _held_share([s.settled and not s.found for s in there]),
         ]
-        false = [_share([s.matches > 0 for s in absent]), _share([s.settled for s in absent])]
+        false = [
+            _held_share([s.matches > 0 for s in absent]),
+            _held_share([s.settled for s in absent]),
+        ]
         cells = [suite, str(len(there)), *shares, str(len(absent)), *false]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def _share(held: Sequence[bool]) -> str:
+def _held_share(held: Sequence[bool]) -> str:
     return f"{np.mean(held):.3f}" if held else "-"

@@ -50,7 +50,7 @@ def derive_target(
         label: what it is, in a few words.
         where: which part; of a bay the side it opens to, where there are several.
     """
-    _check(kind, of, where)
+    _refuse_unfit(kind, of, where)
     prompt = parse_prompt({"id": id, "label": label, "candidate": "c1"})  # holds id and label
     members = [_member(context, name, prompt.id) for name in of]
     try:
@@ -71,7 +71,7 @@ def derive_target(
     return ToolResult({**summary(target), **framed(world)}, (closer_view(context, target),), world)
 
 
-def _check(kind: Kind, of: Sequence[str], where: str | None) -> None:
+def _refuse_unfit(kind: Kind, of: Sequence[str], where: str | None) -> None:
     """Raise a ToolError where the arguments do not go together."""
     problems: list[str] = []
     if kind == "group" and len(of) < 2:
