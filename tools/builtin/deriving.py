@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 from ..context import Context
 from ..errors import InputError, ToolError
 from ..geometry.derived import PartName, Side, bay_of, gap_between, grouped, part_of
-from ..geometry.outline import Outline
+from ..geometry.outline import Outline, outline_of
 from ..perception.detectors.candidates import salient_candidates
 from ..tool import ToolResult, tool
 from ..world import Target
@@ -109,8 +109,13 @@ def _derived(
     things = _other_things(context, members)
     if kind == "group":
         outline, which = grouped(outlines)
-        among = _named_within(things, outline.filled)
-        taken = f" It reaches over {among} too." if among else ""
+        if cut := _named_within([t for t in things if not outline.filled.covers(t[1])], outline):
+            raise InputError(
+                f"The {which} of {ids} cuts through {cut}, where robots around it would stand: "
+                "name that too, leave one out, or draw the outline that is meant."
+            )
+        among = _named_within(things, outline)
+        taken = f" It takes in {among} too." if among else ""
         return outline, f"Its outline is the {which} of {ids}.{taken}"
     if kind == "part":
         half = next(p for p in get_args(PartName) if p == where)
@@ -125,8 +130,7 @@ def _derived(
     else:
         side = next((s for s in get_args(Side) if s == where), None)
         outline, said = bay_of(outlines[0], side, regions), f"in a bay of {ids}"
-    whole = outline.filled.convex_hull
-    cut = _named_within(things, whole)
+    cut = _named_within(things, outline_of(outline.filled.convex_hull))
     return outline, f"Free {said}.{f' Cut out of it: {cut}.' if cut else ''}"
 
 
@@ -151,8 +155,9 @@ def _is_one(region: BaseGeometry, own: BaseGeometry) -> bool:
     return region.intersection(own).area > COVERED * region.area
 
 
-def _named_within(things: Sequence[tuple[str, Polygon]], region: BaseGeometry) -> str:
-    """Name the things that reach into a region."""
+def _named_within(things: Sequence[tuple[str, Polygon]], outline: Outline) -> str:
+    """Name the things that reach into an outline."""
+    region = outline.filled
     found = [n for n, thing in things if region.intersection(thing).area > TOUCHED * thing.area]
     rest = len(found) - NAMED
     return ", ".join(found[:NAMED]) + (f" and {rest} more" if rest > 0 else "")

@@ -48,11 +48,17 @@ def test_a_group_is_one_target_and_says_which_outline(work: "ToolCalls") -> None
     assert made["box"] == pytest.approx([79.5, 59.5, 439.5, 159.5], abs=2)
     green = candidate(work, "green")
     assert made["note"] == (
-        f"Its outline is the convex hull of t1 and t2. It reaches over {green} too."
+        f"Its outline is the convex hull of t1 and t2. It takes in {green} too."
     )
     group = {"relation": "around", "targets": ["t9"], "robots": 12}
     plan = work.call("propose_formation", contract={"groups": [group]})
     assert plan.data["certified"]
+
+
+def test_a_group_does_not_cut_through_another_thing(work: "ToolCalls") -> None:
+    green, white = candidate(work, "green"), candidate(work, "white")
+    with pytest.raises(ToolError, match=f"of t2 and {white} cuts through {green}"):
+        derived(work, "group", "t2", white)
 
 
 def test_candidates_are_measured_for_it_and_leave_no_target(work: "ToolCalls") -> None:
