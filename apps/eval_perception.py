@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from ..evals.perception.finding import finding_table, searches
 from ..evals.perception.samples import MODES, Mode, measured, peak_memory
 from ..evals.perception.tables import Row, markdown, row
 from ..tools.errors import InputError
@@ -22,7 +23,7 @@ Modes = Annotated[
     typer.Option(
         "--mode",
         help="How things are pointed at: outline, box or point; repeatable.",
-        show_default="all",
+        show_default="all, and by colour",
     ),
 ]
 Named = Annotated[str, typer.Option("--segmenter", help="Segmenter to measure, as in formup run.")]
@@ -36,18 +37,23 @@ def perception(
 
     Points three times at each thing. IoU is the overlap with the true outline; e95 the distance
     within which 95 % of the boundaries lie, divided by the square root of the area; placed the
-    share of outlines whose confidence reaches the threshold.
+    share of outlines whose confidence reaches the threshold. Without --mode it also asks for
+    things by their colour, every fourth time for a colour that the picture has nowhere.
     """
     chosen = segmenter_named(segmenter)
     rows: list[Row] = []
+    pictures = suites or ["photos", "photos-added"]
     for way in _modes(mode, chosen, segmenter):
-        for suite in suites or ["photos", "photos-added"]:
+        for suite in pictures:
             rows.append(row(segmenter, way, suite, list(measured(suite, way, chosen))))
+    sought = {} if mode else {suite: list(searches(suite)) for suite in pictures}
     if json_:
         data = {"rows": [asdict(r) for r in rows], "peak_memory_mib": round(peak_memory())}
+        data |= {"searches": {suite: [asdict(s) for s in made] for suite, made in sought.items()}}
         say(json.dumps(data, indent=1))
     else:
         say(markdown(rows))
+        say(f"\n{finding_table(sought)}" if sought else "")
         say(f"\nPeak memory: {peak_memory():.0f} MiB.")
 
 

@@ -52,7 +52,8 @@ class Target(Value):
         box: x0, y0, x1, y1.
         confidence: alpha, 0 to 1: self-consistency of the segmentation, not accuracy.
         outline: as measured, with its holes.
-        prompt: what it was found from: point, box, outline, candidate or mask.
+        prompt: what it was found from: point, box, outline, candidate or mask; or what it was
+            derived as: group, gap, bay or part.
         parts: the values that alpha was computed from.
         source: what it was found from, if that was an outline somebody drew, or a mask.
         missed: where the rough outline it was found from reaches beyond `outline`, (x, y, by px).

@@ -29,6 +29,7 @@ from .counting import (
     refused,
     without_closure,
 )
+from .derived import about_derived
 from .drafting import (
     contract_of,
     options_of,
@@ -193,7 +194,8 @@ def _narrowed(task: Task, history: History) -> Task | Reply:
         return agreed
     task, answers = _chosen_by_answers(task, history)
     task = replace(task, instruction=restated(task, answers).text)
-    several = about_several(task, task.robots or _number_answered(history), history)
+    number = task.robots or _number_answered(history)
+    several = about_derived(task, number, history) or about_several(task, number, history)
     if several is not None:
         if several.name == "propose_formation" and _was_doubted(history):
             several.arguments["contract"] |= {"reading": READING}

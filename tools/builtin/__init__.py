@@ -2,6 +2,7 @@
 
 from ..tool import Tool
 from .committing import ask_user, deploy, propose_formation, report_impossible
+from .deriving import derive_target
 from .editing import edit_formation, undo
 from .measuring import check_point, describe_shape, measure
 from .sampling import sample_along_edges, sample_inside, sample_shape
@@ -11,6 +12,7 @@ TOOLS: tuple[Tool, ...] = (
     look,
     locate_object,
     segment,
+    derive_target,
     describe_shape,
     check_point,
     sample_along_edges,

@@ -96,7 +96,8 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
     Without a query it measures what the person pointed at, or else lists all that stands out.
     With one, every match with numeric reasons. Nouns count where a network knows them,
     else `not_looked_for` names them: say "round", not "coin". Only when settled is true is there
-    exactly one; doubt and lacking say why not. Absent: not even a part of a thing has that look.
+    exactly one; doubt and lacking say why not, note what was too small to count. Absent: not
+    even a part of a thing has that look.
 
     Args:
         query: colours, shade, shapes, traits, superlatives and relations that tell it apart.
@@ -129,6 +130,7 @@ def locate_object(context: Context, query: Query | None = None) -> ToolResult:
             "lacking": selection.lacking,
             "absent": bool(selection.lacking) and not _hinted(query, context.candidates()),
             "things": len(clear),
+            **({"note": selection.note} if selection.note else {}),
             **ignored,
             **framed(context.world),
         },

@@ -73,14 +73,24 @@ def measured_all(context: Context, prompts: Iterable[TargetPrompt]) -> World:
             error has a picture of it.
     """
     for given in prompts:
-        context, target, threshold = measured(context, given)
-        if target.confidence < threshold and not _is_confirmed(context.world, target):
-            context.observed(context.world.having(doubted=target))
-            shown = closer_view(context, target)
-            raise _insufficient(target.confidence, threshold, target.prompt).showing(shown)
+        context, target = trusted(context, given)
         context = context.at(context.world.with_target(target))
         context.observed(context.world)
     return context.world
+
+
+def trusted(context: Context, given: TargetPrompt) -> tuple[Context, Target]:
+    """Measure what a prompt points at; see `measured`.
+
+    Raises:
+        ToolError: also if its mask is too doubtful, in which case the error has a picture of it.
+    """
+    context, target, threshold = measured(context, given)
+    if target.confidence < threshold and not _is_confirmed(context.world, target):
+        context.observed(context.world.having(doubted=target))
+        shown = closer_view(context, target)
+        raise _insufficient(target.confidence, threshold, target.prompt).showing(shown)
+    return context, target
 
 
 def measured(context: Context, given: TargetPrompt) -> tuple[Context, Target, float]:

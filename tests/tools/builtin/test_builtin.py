@@ -23,6 +23,7 @@ NAMES = [
     "look",
     "locate_object",
     "segment",
+    "derive_target",
     "describe_shape",
     "check_point",
     "sample_along_edges",

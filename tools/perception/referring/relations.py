@@ -29,6 +29,7 @@ from .oddness import odd_one_out
 from .query import Description, Oddness, Pick, Query, Relation, wording
 from .ranking import Ranked, rank, rank_nearest
 from .spatial import ground_filter, relation_filter
+from .specks import speck_filter, specks_among, specks_note
 
 __all__ = ["Description", "Match", "Pick", "Query", "Relation", "Selection", "select"]
 
@@ -56,12 +57,14 @@ class Selection:
         settled: whether there is exactly one match, and the decision is not a close one.
         doubt: why it is not settled, one sentence; empty if it is.
         lacking: what there is instead, if nothing looks like the description; else empty.
+        note: what else fits but was left out as a speck, one sentence; empty if nothing was.
     """
 
     matches: tuple[Match, ...]
     settled: bool
     doubt: str
     lacking: str
+    note: str = ""
 
 
 class _Step(NamedTuple):
@@ -80,12 +83,14 @@ class _Answer:
         reasons: why, by index, short sentences.
         doubt: why it is not one clear thing; empty if it is.
         number: why the count of things that fit is not the stated one; empty if it is.
+        note: which specks were left out; empty if none was.
     """
 
     indices: tuple[int, ...]
     reasons: dict[int, tuple[str, ...]]
     doubt: str
     number: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -133,7 +138,7 @@ def _select(things: Things, query: Description) -> Selection:
         return Selection((), False, "the two things it is between are one and the same", "")
     merged = _merged(things, answers, [o for found in others for o in found], _capped(others))
     matches = tuple(Match(things.candidates[i].id, merged.reasons[i]) for i in merged.indices)
-    return Selection(matches, not merged.doubt, merged.doubt, "")
+    return Selection(matches, not merged.doubt, merged.doubt, "", answers[0].note)
 
 
 def _other_thing(things: Things, thing: str | Description) -> _Other:
@@ -197,8 +202,11 @@ def _answer_in(things: Things, query: Description, looks: list[Filter], others: 
     if not len(fitting):
         return _Answer((), {}, _empty_relation(things, looks, where, others))
     steps = _ordering_steps(things, query, others)
+    specks = _left_out(things, query, _degrees(things, filters))
+    note = specks_note(things, specks, _degrees(things, filters))
+    filters.append(speck_filter(things, specks))
     if steps:
-        filters.append(ground_filter(things, fitting))
+        filters.append(ground_filter(things, np.setdiff1d(fitting, specks)))
     degrees = _degrees(things, filters)
     loose, strict = np.flatnonzero(degrees >= POSSIBLE), np.flatnonzero(degrees == SURE)
     possibly = _picked(things, query, steps, loose)
@@ -209,7 +217,20 @@ def _answer_in(things: Things, query: Description, looks: list[Filter], others: 
         i: (*filter(None, (f.explain(i) for f in filters)), *answer.reasons.get(i, ()))
         for i in answer.indices
     }
-    return replace(answer, reasons=reasons)
+    return replace(answer, reasons=reasons, note=note)
+
+
+def _left_out(things: Things, query: Description, degrees: IntArray) -> IntArray:
+    """Return the specks that do not count; a plain description keeps the only rival of a thing.
+
+    Being tiny may be what makes a thing the odd one out.
+    """
+    specks = specks_among(things, degrees)
+    if any(p.by in get_args(Oddness) for p in query.picks):
+        return specks[:0]
+    counted = isinstance(query, Query) and query.count is not None
+    several = (degrees > NO).sum() - len(specks) > 1
+    return specks if query.picks or counted or several else specks[:0]
 
 
 def _combined(surely: _Answer, possibly: _Answer, perhaps: str) -> _Answer:
