@@ -1,8 +1,9 @@
 """The value that words about an existing plan are read into."""
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from .followup_edits import Effect
 
@@ -49,3 +50,14 @@ class Followup:
         """Words for things that have to be found, without repeats."""
         named = re.findall(r"'\?([^']*)'", repr([*self.edits, self.query]))
         return list(dict.fromkeys(named))
+
+
+def robot_fields(edit: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the fields of an edit in which single robots are named."""
+    return ("a", "b") if edit["kind"] == "swap" else ("robot",)
+
+
+def main_topic(talk: Sequence[str]) -> str:
+    """Return the main topic of talk: thanks and greetings come last."""
+    weighty = (about for about in talk if about not in ("thanks", "hello"))
+    return next(weighty, talk[0] if talk else "")

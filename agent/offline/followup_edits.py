@@ -126,6 +126,9 @@ def rounded(value: float) -> float:
     return round(value, 3) + 0.0  # never -0.0
 
 
+OUT_OF = re.compile(r"\b(?:out of|off)\b", re.IGNORECASE)
+
+
 def offset(slots: Slots, said: Utterance) -> Effects:
     """Move robots further out or in: by px, a share, or a factor of the distance."""
     ways = set(slots["radial"])
@@ -137,6 +140,12 @@ def offset(slots: Slots, said: Utterance) -> Effects:
     if len(ways) > 1 or (slots.has("num", "px") and length is None):
         return None
     kind = ways.pop()
+    if said.standing.relation == "inside" and OUT_OF.search(said.words):
+        return ask(f'Out of it, in "{said.words}": where to?', "around it", "left of it")
+    loose = said.standing.relation == "inside" and "snug" in said.kinds and length is None
+    if loose:  # inside, robots are nowhere further out
+        factor = factor_of(slots)
+        return [{"kind": "spacing", "factor": rounded(factor if kind == "out" else 1 / factor)}]
     if length is not None:
         exact = ADDED_LENGTH.search(said.words) or EXACT.search(said.words)
         return [{"kind": "distance" if exact else kind, "px": length}]
@@ -286,12 +295,6 @@ def snug(slots: Slots, said: Utterance) -> Effects:
     factor = factor_of(slots)
     wide = slots["snug"][0] == "wide"
     return [{"kind": "spacing", "factor": rounded(factor if wide else 1 / factor)}]
-
-
-def tightfit(slots: Slots, said: Utterance) -> Effects:
-    """Draw the robots in to the distance that a tight fit has: "as close as you can"."""
-    slots.has("all", "radial", "again")
-    return [{"kind": "arrange", "demands": {"fit": "tight", "clearance": None}}]
 
 
 def heading(slots: Slots, said: Utterance) -> Effects:

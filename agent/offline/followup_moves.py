@@ -49,11 +49,20 @@ BESIDE = re.compile(
 """Words for where robots stand or how many go: "to the left of it", "5 robots to the left"."""
 
 
+NUDGED = re.compile(r"\b(?:nudge|move|push|shift|slide|bring|pull|get|put) [0-9]+ ", re.IGNORECASE)
+"""Words with which a number may name a robot or a distance."""
+
+
 def shift(slots: Slots, said: Utterance) -> Effects:
     """Move all robots left, right, up or down; after moves of single robots, those."""
     by = None if BESIDE.search(said.words) else way(slots, said)
     if by is None:
         return None
+    if "num" in slots and "px" not in slots and NUDGED.search(said.words):
+        n = int(slots["num"][0])
+        if 1 <= n <= said.count:  # "nudge 5 to the left": a robot, or as far?
+            rest = said.words[said.words.find(str(n)) + len(str(n)) :].strip()
+            return ask(f"{n} of what?", f"robot {n} a bit {rest}", f"{n} px {rest}")
     placed = [e["robot"] for e in said.last if e["kind"] == "place"]
     if placed and len(placed) == len(said.last) and not TEAM.search(said.words):
         return [{"kind": "place", "robot": r, "by": list(by)} for r in placed]

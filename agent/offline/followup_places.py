@@ -29,7 +29,7 @@ TOWARDS = {
     **dict.fromkeys(("top", "upper", "upp", "high", "north"), (0, -1)),
     **dict.fromkeys(("bottom", "lower", "low", "south"), (0, 1)),
 }
-BOT = r"(?:robot|bot|drone|rover|unit|machine)"
+BOT = r"(?:robot|bot|drone|rover|unit|machine|lad|guy|fella|fellow|chap|boy)"
 END = r"(?:left|right|top|bottom|upper|lower|north|south|east|west)"
 MIDDLE = r"(?:middle|centre|center|central|cent(?:re|er)most|middlemost)"
 MOST = (
@@ -64,6 +64,8 @@ PHRASES = tuple(
         rf"\bthe (?P<rank>{RANKS})(?P<one>) from (?:the )?(?P<way>{END})\b{CORNER}",
         rf"\b(?:everyone|everybody|anyone|those|all (?:of them|the {BOT}s)?)(?P<many>) {STANDS}"
         rf"(?:{NEAR}|{AT})(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
+        rf"(?:^|\bthe |[,;] ?|\band )(?P<way>{WAY}) (?P<n>{'|'.join(AMOUNTS)})(?P<one>)"
+        rf"(?! (?:{BOT}|px|pix|m\b|metre|meter|cm|robots|more|things))(?=\W|$)",
         rf"\bthe (?P<n>{'|'.join(AMOUNTS)})(?P<one>) {STANDS}(?:{NEAR}|{AT})"
         rf"(?P<way>{WAY})\b{CORNER}(?! (?:of|{BOT}))",
     )

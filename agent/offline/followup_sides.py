@@ -21,7 +21,7 @@ from .followup_edits import (
     where,
 )
 from .followup_frames import Slots
-from .followup_teams import count, group_of, target, whole
+from .followup_teams import TOO, count, group_of, target, whole
 
 PUSHING = re.compile(r"\b(?:move|shift|nudge|push|pull|slide|drag)\b", re.IGNORECASE)
 """Verbs with which "all right" is a direction, not a side to stand on."""
@@ -42,6 +42,8 @@ def sides(slots: Slots, said: Utterance) -> Effects:
         return None
     if not named or len(set(named)) < len(named) or ("only" in slots and without):
         return None
+    if TOO.search(said.words) and not without:
+        return ask(f'"{said.words}": are the robots to be there alone, or more robots there?')
     if said.standing.relation in RINGS and not {"long", "short"} & {*named}:
         return [{"kind": "sides", "without" if without else "only": named}]
     if len(named) > 1 or " half" in str(named[0]) or without:

@@ -53,6 +53,8 @@ def add_some(slots: Slots, said: Utterance) -> Effects:
     between = slots.get("relation", ()) or slots.get("spacing", ())
     if n is None or (between and "between" not in said.words.lower().split()):
         return None
+    if between and re.search(r"\b(?:each|every|all)\b", said.words, re.IGNORECASE):
+        return None  # "one between each": as many as there are gaps
     if between and said.standing.relation == "corners":
         ring: Effect = {"kind": "arrange", "demands": {"relation": "around"}}
         return [ring, {"kind": "count", "robots": said.count + n}]

@@ -366,3 +366,20 @@ def _nearest_to_what(slots: Slots, said: Utterance, robots: list[int]) -> Effect
         return [query | {"to": f"robot {robots[0]}"}]
     to = slots["point"][0] if "point" in slots else centre_of(slots, said)
     return None if to is None else [query | {"to": list(to)}]
+
+
+def tightfit(slots: Slots, said: Utterance) -> Effects:
+    """Draw the robots in to the distance that a tight fit has: "as close as you can"."""
+    slots.has("all", "radial", "again")
+    return [{"kind": "arrange", "demands": {"fit": "tight", "clearance": None}}]
+
+
+def about_face(slots: Slots, said: Utterance) -> Effects:
+    """Have the robots look the opposite way; which way they look has to be known."""
+    now = said.standing.groups[0].get("heading")
+    turned = {"towards": "away", "away": "towards"}.get(str(now))
+    if isinstance(now, (int, float)):
+        turned = (now + 180) % 360
+    if turned is None or len(said.standing.groups) > 1:
+        return ask("Which way are they to look?", "facing out", "facing in")
+    return [{"kind": "heading", "to": turned}]

@@ -5,10 +5,9 @@ person is asked, quoting what was not understood. No words are left out.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 from .accounting import read_instruction
 from .asides import TELLS_OF, without_asides
@@ -16,7 +15,7 @@ from .clauses import NO_EDITS, SLIGHT, TALK, Clause, Line, is_empty, is_part
 from .drafting import contract_of
 from .drawn_forms import form_in
 from .escorting import without_follow
-from .followup import Followup, Kind
+from .followup import Followup, Kind, main_topic, robot_fields
 from .followup_chunks import Chunk
 from .followup_edits import Effect, listed
 from .followup_go import with_sure_go
@@ -27,6 +26,7 @@ from .followup_things import impossible
 from .followup_words import rules, word_set
 from .spelling import spelled
 from .standing import Standing
+from .subjects import unclear_subject
 
 WITHOUT_PLAN = (
     *(*TALK, "go", "hold", "undo", "redo", "first", "restart"),
@@ -260,6 +260,9 @@ def _contradiction(line: Line, edits: Sequence[Effect]) -> Followup | None:
         for e in edits
         if "group" not in e and (e["kind"] == "count" or not e.get("robots"))
     ]
+    who = unclear_subject(line.words, edits, pointed=bool(line.standing.pointed))
+    if who:
+        return _as_question(line, who)
     kept = KEEPS.search(line.words)
     if kept and {*alone} & KEPT[kept["what"].lower()]:
         question = f'"{line.words}" both changes and keeps the {kept["what"]}. Which?'
@@ -284,7 +287,7 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
     """Return the follow-up of effects that neither ask nor refuse."""
     kinds = [e["kind"] for e in effects]
     stays = [r for e in effects if e["kind"] == "stay" for r in e["robots"]] + [*line.excepted]
-    moved = {e.get(name) for e in line.standing.edits for name in _robot_fields(e)}
+    moved = {e.get(name) for e in line.standing.edits for name in robot_fields(e)}
     swapped = [e["kind"] for e in line.standing.edits] == ["swap"] and moved & {*stays}
     unchanged = not moved or line.standing.said not in ("", line.standing.words)
     if stays and not edits and unchanged and line.denies:
@@ -317,19 +320,8 @@ def _settled(line: Line, effects: Sequence[Effect], edits: list[Effect], undo: i
         go="go" in kinds and not edits,  # the person looks at a new plan first
         hold="hold" in kinds,
         query=query and {k: v for k, v in query.items() if k != "kind"},
-        about=_about([e["about"] for e in effects if e["kind"] == "talk"]),
+        about=main_topic([e["about"] for e in effects if e["kind"] == "talk"]),
     )
-
-
-def _robot_fields(edit: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the fields of an edit in which single robots are named."""
-    return ("a", "b") if edit["kind"] == "swap" else ("robot",)
-
-
-def _about(talk: Sequence[str]) -> str:
-    """Return the main topic of talk: thanks and greetings come last."""
-    weighty = (about for about in talk if about not in ("thanks", "hello"))
-    return next(weighty, talk[0] if talk else "")
 
 
 def _not_framed(line: Line) -> Followup:

@@ -30,9 +30,15 @@ class OtherThings(Portions):
 
     def _heading(self, demand: Demand) -> bool:
         other = self._other(demand)
+        if self.reading.form is not None and self._points(demand):
+            return False  # "a V pointing at it": its tip, not the robots
         if other is None or not self._refers_elsewhere(demand):
             return self._set("heading", demand.value)
         return demand.value == "towards" and self._aim("heading", other)
+
+    def _points(self, demand: Demand) -> bool:
+        said = {self.items[k].symbol for k in range(demand.first, demand.last)}
+        return not said.isdisjoint(("pointing", "points", "point", "pointed", "aimed", "aiming"))
 
     def _heading_at(self, demand: Demand) -> bool:
         """Read a look at a thing whose noun the tagger did not take for one."""
