@@ -107,7 +107,8 @@ class _Reader:
             elif demand.sets not in OF_OTHERS:
                 self.fields.mentioned += range(demand.first, demand.last)
             self.taken[demand.first : demand.last] = [True] * (demand.last - demand.first)
-        for demand in self.fields.unsettled():
+        tips = self.fields.pointing if self.reading.form is not None else []
+        for demand in [*self.fields.unsettled(), *tips]:  # "a V pointing at it": its tip
             self.reading.unread.append(self._quote(demand.first, demand.last))
         self._count_corners()
         self._refer()

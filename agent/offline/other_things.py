@@ -26,12 +26,13 @@ class OtherThings(Portions):
     ) -> None:
         super().__init__(items, reading, metres_per_pixel)
         self.text = text
+        self.pointing: list[Demand] = []  # headings that may be of a form's tip, not of the robots
         self.mentioned: list[int] = []  # items of demands whose phrases may name the target
 
     def _heading(self, demand: Demand) -> bool:
         other = self._other(demand)
-        if self.reading.form is not None and self._points(demand):
-            return False  # "a V pointing at it": its tip, not the robots
+        if self._points(demand):
+            self.pointing.append(demand)
         if other is None or not self._refers_elsewhere(demand):
             return self._set("heading", demand.value)
         return demand.value == "towards" and self._aim("heading", other)

@@ -14,6 +14,7 @@ NO_NOUN = frozenset(("one", "ones", "side", "sides", "left", "right", "top", "bo
 UNITS = frozenset(("px", "pixel", "pixels", "m", "metre", "metres", "meter", "meters", "cm", "mm"))
 SIDES = frozenset(("left", "right", "top", "bottom", "upper", "lower"))
 PARTS = frozenset(("half", "halves", "quarter"))
+OPEN = frozenset(("open", "free", "clear", "unguarded", "empty"))
 OF_TEAM = frozenset(("ones", "group", "row", "lot", "pair"))
 
 
@@ -43,8 +44,10 @@ def relabelled(words: Sequence[Token], labels: Sequence[str]) -> tuple[str, ...]
             found[k : k + 2] = ["thing", "thing"]
         elif after[0] in SIDES and after[2] != "of" and text in ("the", "its", "only"):
             parted = after[1] in PARTS or (after[1] in OF_TEAM and after[0] in said)
-            if parted:
-                found[k : k + 3] = ["demand"] * len(found[k : k + 3])
+            opened = after[1] in OPEN or (after[1] in ("side", "end") and after[2] in OPEN)
+            if parted or opened:
+                until = k + 3 + (opened and after[1] not in OPEN)
+                found[k:until] = ["demand"] * len(found[k:until])
         elif text == "to" and after[0] in DEFINITE and _begins_with_from(words, found, k):
             found[k] = "command"
         if found[k] == "thing" and _is_length(words, k):  # "the tree by 30 px"

@@ -173,6 +173,15 @@ def test_a_distance_from_another_thing_is_kept(words: str, other: str, far: floa
 
 
 @pytest.mark.parametrize(
+    "words", ["ring it but leave the top open, 7 of you", "7 around it, keep the top side free"]
+)
+def test_a_side_that_is_left_open_is_no_thing(words: str) -> None:
+    reading = read_instruction(words)
+    assert not reading.unread
+    assert (reading.things, reading.group["sides"]) == ([], ["left", "right", "bottom"])
+
+
+@pytest.mark.parametrize(
     "words",
     [
         "8 robots round it, nobody nearer than 25 px to the blades",
@@ -235,6 +244,11 @@ def test_arrangements_as_strangers_say_them(
         "guests should see two straight rows, one on each long side of the carpet",
         "the planks need a ring, three robots clear",
         "6 robots around it, the rest is closed",
+        "ten around the boat with the bow side open. bow is on the right",
+        "5 in a diagonal left of this",
+        "5 left of this, rising to the right",
+        "three in a wedge left of it, pointing at it",
+        "I need traffic held back on the left: a line of six beside the wreck, facing left.",
     ],
 )
 def test_what_changes_the_arrangement_is_no_background(words: str) -> None:
