@@ -75,8 +75,8 @@ def remove_some(slots: Slots, said: Utterance) -> Effects:
 
 def leave(slots: Slots, said: Utterance) -> Effects:
     """Remove the robots named; the others close up unless the places are to stay empty."""
-    robots = [r for named in slots["robots"] for r in named]
-    if len(set(robots)) >= said.count:
+    robots = list(dict.fromkeys(r for named in slots["robots"] for r in named))
+    if len(robots) >= said.count:
         return refuse("All robots would leave: nothing would be left to place.")
     slots.has("rest", "closeup", "leave", "remove")  # closing up is what the others do anyway
     return [{"kind": "skip" if slots.has("empty", "stay") else "remove", "robots": robots}]
