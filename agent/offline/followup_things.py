@@ -24,6 +24,8 @@ def pointing_at(words: str) -> str:
     return words if shown else re.sub(r"\bit\b", "this", words, count=1)
 
 
+ACROSS = re.compile(r"side of (?:the )?(.+)")
+"""Words after "the other" for the side opposite: "the other side of the crate"."""
 GOING = re.compile(
     r"^(?!.*\b(?:back|undo|again)\b).*\b(?:all|everyone|everybody|them|robots?|half|two|three)\b.* "
     r"(?:to|around|round|at) $",
@@ -50,6 +52,9 @@ def resolved(chunk: Chunk, text: str, standing: Standing) -> Chunk:
     if "thing" in kinds:
         another = re.search(r"\banother $", text[: chunk.start], re.IGNORECASE)
         other = bool(kinds.pop("other", False) or another)
+        aside = ACROSS.fullmatch(str(kinds["thing"]))
+        if aside and other and _id_of(aside[1], False, standing) in standing.targets:
+            return replace(chunk, kinds={"opposite": ""})
         name = _id_of(str(kinds["thing"]), other, standing)
         if name.startswith("?") and len(standing.pointed) == 1 and _is_shown(chunk, text):
             name = standing.pointed[0]
