@@ -23,6 +23,8 @@ PLACING = re.compile(
     re.IGNORECASE | re.DOTALL,
 )
 """A verb that, with robots, a number of them and a thing, makes a new instruction."""
+IN_A_RING = re.compile(r"\b(?:in|as|into) an? ?(?:ring|circle)|in circle\b", re.IGNORECASE)
+INTO = re.compile(r"\b(?:in(?! an? | circle)|into|inside|onto|fill|cover)\b", re.IGNORECASE)
 TOO = re.compile(r"\b(?:too|also|as well|aswell|in addition|additionally)\b", re.IGNORECASE)
 ALIKE = re.compile(r"\b(?:same|too|also|as well|likewise)\b", re.IGNORECASE)
 SHARES = {"half": 2, "third": 3, "quarter": 4}
@@ -254,7 +256,8 @@ def target(slots: Slots, said: Utterance) -> Effects:
     kept = relation == said.standing.relation or (
         relation == "around" and said.standing.relation in LIKE_A_RING
     )
-    if "same" in slots or "relation" not in slots or kept:
+    as_it_is = "same" in slots and not IN_A_RING.search(said.words)
+    if as_it_is or "relation" not in slots or kept:
         return [moved]
     return (
         [moved, {"kind": "arrange", "demands": group_of(relation, slots)}]
@@ -295,10 +298,17 @@ def split(slots: Slots, said: Utterance) -> Effects:
     if to in said.standing.targets and not joins:
         return None
     moved: Effect = {"kind": "target", "to": to}
+    inside = said.standing.relation == "inside"
     if some == said.count:
-        return [moved]
+        ringed = inside and "relation" in slots and not INTO.search(said.words)
+        return [moved, {"kind": "arrange", "demands": {"relation": "around"}}][: 1 + ringed]
     stays = {"stay": True} if "stay" in slots else {}
-    return [moved | {"robots": some} | stays]
+    parted = moved | {"robots": some} | stays
+    known = {t for g in said.standing.groups for t in g.get("targets", ())}
+    if not inside or to in known or INTO.search(said.words):
+        return [parted]
+    ring = {"relation": "around"}  # they go to it, and not onto it
+    return [parted, {"kind": "arrange", "demands": ring, "group": len(said.standing.groups) + 1}]
 
 
 def _number_going(slots: Slots, said: Utterance) -> int | None:

@@ -32,6 +32,10 @@ def unclear_subject(words: str, edits: Sequence[Mapping[str, Any]], *, pointed: 
         return ""
     if ONE.search(words) and not pointed:
         return f'Which robot is meant in "{words}"? Name it by its number.'
+    grouped = [k for k, e in enumerate(edits) if "group" in e]
+    alike = [e for e in edits[grouped[0] + 1 :] if "group" not in e] if grouped else []
+    if {e["kind"] for e in alike} & {*OF_ALL, "distance", "spacing"} and not ALL.search(words):
+        return f'Which team is meant in all of "{words}"? Say it of one, or of all.'
     placed = [k for k, e in enumerate(edits) if e["kind"] == "place"]
     after = placed and edits[-1] in of_all and len(edits) > placed[-1] + 1
     if after and ALL.search(words) is None:
