@@ -35,11 +35,12 @@ INSTRUCTIONS = (
 
 
 class _Server(MCPServer[Access]):
-    """A server that says in one sentence which arguments a call lacks, or has wrong."""
+    """A server that says which arguments a call lacks, has wrong, or that no tool knows."""
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Access, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
+        await self._check_known(name, arguments)
         try:
             return await super().call_tool(name, arguments, context)
         except ToolError as error:
@@ -48,6 +49,17 @@ class _Server(MCPServer[Access]):
                 raise
             told = f"{name} cannot be called with these arguments: {violations(wrong)}"
             raise ToolError(told) from wrong
+
+    async def _check_known(self, name: str, arguments: dict[str, Any]) -> None:
+        """Refuse arguments that a tool does not have; the library would drop them silently."""
+        offered = {tool.name: tool.input_schema for tool in await self.list_tools()}
+        known = list(offered.get(name, {}).get("properties", arguments))
+        unknown = [f"{argument[:100]!r}" for argument in arguments if argument not in known]
+        if unknown:
+            raise ToolError(
+                f"{name} does not know {', '.join(unknown)}; nothing was done. Its arguments are "
+                f"{', '.join(known)}: leave out the others, or call them so."
+            )
 
 
 def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
