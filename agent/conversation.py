@@ -6,24 +6,23 @@ decided only here, in the same way for every model.
 
 import asyncio
 import copy
-import re
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, Unpack
 
 from ..tools.context import Context, Services, Settings
 from ..tools.errors import InputError
-from ..tools.fleet.protocol import Fleet
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .first_message import standing
 from .model import Model
 from .offline.followups import read_followup
 from .offline.standing import Standing
-from .open_question import calls_off, check_settled, drops, whole_instruction
+from .open_question import asked_again, calls_off, check_settled, drops, whole_instruction
 from .outcomes import Paused
 from .session import Run, SayOptions, Show
+from .stopping import is_stop, stop_all
 from .store.protocol import StoredSession
 from .wrappers.commands import Commands
 
@@ -34,16 +33,6 @@ UNCHANGED = "Nothing was changed. To take back the change before that, say undo.
 MAY_NOT_MOVE = (
     "You may plan here but not move robots: nothing moves; somebody who may has to say go."
 )
-STOP = re.compile(
-    r"(?=.*\b(?:stop|halt|freeze)\b)"
-    r"(?:\W*(?:stop|halt|freeze|please|now|it|the|robots?|all|them|every\w*|team|"
-    r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
-)
-"""A sentence that holds the robots at once, before any model reads it."""
-STOP_DRIVING = re.compile(r"\b(?:stop+|halt|freeze|hold|wait|abort|cancel|don'?t|whoa|enough)\b")
-"""Words that hold driving robots if the sentence is short: one stop too many costs little."""
-SHORT = 8
-"""Most words of a short sentence."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
 
 
@@ -124,7 +113,7 @@ class Session:
             if not (shown or fresh or drops(run.outcome, kind)):
                 return self._keep(await self._answered(run, words, show))
             if shown:  # the answer is something pointed at
-                words = f"{run.report.instruction} {words}".strip()
+                words = f"{run.context.words} {words}".strip()
             elif fresh:
                 words = said = fresh
         elif run is not None and calls_off(words) and run.world.current == run.began.current:
@@ -283,6 +272,9 @@ class Session:
         outcome = run.outcome
         assert isinstance(outcome, Paused)
         if outcome.call.name == "ask_user":
+            if again := asked_again(outcome.call, words, self._standing(run)):
+                asks = self._commanded([("ask_user", again)])
+                return await asks.aresume(run, answer=words, show=show)
             fixed = run.context.settings
             fixed = fixed.model_copy(update={"may_deploy": fixed.may_deploy and self.may_move})
             left = replace(run, context=replace(run.context, settings=fixed))
@@ -357,30 +349,6 @@ class Session:
             if self.run is not None:
                 await self.run.context.services.close_fleets()
             await self.agent.aclose()
-
-
-async def stop_all(fleets: Iterable[Fleet]) -> None:
-    """Stop every fleet, even if another one fails to stop.
-
-    Raises:
-        FleetError: of the first fleet that could not be stopped.
-    """
-    ends = await asyncio.gather(*(fleet.stop() for fleet in fleets), return_exceptions=True)
-    for problem in ends:
-        if isinstance(problem, BaseException):
-            raise problem
-
-
-def is_stop(words: str, *, driving: bool = False) -> bool:
-    """Return whether words say to hold the robots at once.
-
-    Args:
-        driving: whether a turn is under way that may be driving them.
-    """
-    said = words.lower()
-    if driving:
-        return len(said.split()) <= SHORT and STOP_DRIVING.search(said) is not None
-    return STOP.fullmatch(said) is not None
 
 
 def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:
