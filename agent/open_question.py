@@ -13,7 +13,7 @@ from .offline.answering import talk
 from .offline.drafting import things_needed
 from .offline.followups import read_followup
 from .offline.standing import Standing
-from .outcomes import Paused
+from .outcomes import Outcome, Paused
 
 LED = r"\W*(?:(?:oh|ok|okay|no|well|ah|actually|please|then|just)\b\W*)*"
 ENDS = r"(?:\W+(?:please|then|thanks|thank you))*\W*"
@@ -49,6 +49,11 @@ def calls_off(words: str, *, undoing: bool = False) -> bool:
     """
     said = words.lower()
     return bool(CALLED_OFF.fullmatch(said) or (undoing and UNDONE.fullmatch(said)))
+
+
+def asks(outcome: Outcome | None) -> bool:
+    """Return whether a turn waits for the answer to a question."""
+    return isinstance(outcome, Paused) and outcome.call.name == "ask_user"
 
 
 def drops(outcome: Paused, kind: str) -> bool:
