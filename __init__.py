@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .agent.agent import Agent
-    from .agent.conversation import is_stop
     from .agent.limits import Limits
     from .agent.messages import Call, Reply, Result, User
     from .agent.outcomes import Answered, Cancelled, Paused, Stopped
@@ -13,6 +12,7 @@ if TYPE_CHECKING:
     from .agent.report import Report
     from .agent.service import Service
     from .agent.session import Run, load_run
+    from .agent.stopping import is_stop
     from .agent.store.places import store_at
     from .agent.wrappers.doubles import FunctionModel, ScriptedModel
     from .tools.builtin import TOOLS
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "agent.agent": ("Agent",),
-    "agent.conversation": ("is_stop",),
+    "agent.stopping": ("is_stop",),
     "agent.limits": ("Limits",),
     "agent.messages": ("Call", "Reply", "Result", "User"),
     "agent.wrappers.doubles": ("FunctionModel", "ScriptedModel"),

@@ -6,26 +6,27 @@ decided only here, in the same way for every model.
 
 import asyncio
 import copy
-import re
-from collections.abc import Awaitable, Callable, Coroutine, Iterable, Sequence
+from collections.abc import Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, Unpack
+from typing import Any, Unpack
 
 from ..tools.context import Context, Services, Settings
 from ..tools.errors import InputError
-from ..tools.fleet.protocol import Fleet
 from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .first_message import standing
-from .model import Model
 from .offline.followups import read_followup
 from .offline.standing import Standing
-from .open_question import calls_off, check_settled, drops, whole_instruction
+from .open_question import asked_again, asks, calls_off, check_settled, drops, whole_instruction
 from .outcomes import Paused
+from .said_measures import AGAIN, place_said, scale_said, scale_told
 from .session import Run, SayOptions, Show
+from .stopping import is_stop, stop_all
 from .store.protocol import StoredSession
+from .turn_taker import TurnTaker
 from .wrappers.commands import Commands
+from .wrappers.telling import Telling
 
 NOTHING_SAID = "Say what to do first, such as surround the coin with 6 robots."
 HELD = "The robots are held where they are. Say what to change, or go to drive on."
@@ -34,42 +35,7 @@ UNCHANGED = "Nothing was changed. To take back the change before that, say undo.
 MAY_NOT_MOVE = (
     "You may plan here but not move robots: nothing moves; somebody who may has to say go."
 )
-STOP = re.compile(
-    r"(?=.*\b(?:stop|halt|freeze)\b)"
-    r"(?:\W*(?:stop|halt|freeze|please|now|it|the|robots?|all|them|every\w*|team|"
-    r"immediately|at|once|emergency|right|just|quick|oh|no|hey|ok|moving|driving|this|that)\b)+\W*"
-)
-"""A sentence that holds the robots at once, before any model reads it."""
-STOP_DRIVING = re.compile(r"\b(?:stop+|halt|freeze|hold|wait|abort|cancel|don'?t|whoa|enough)\b")
-"""Words that hold driving robots if the sentence is short: one stop too many costs little."""
-SHORT = 8
-"""Most words of a short sentence."""
 YES, NO = frozenset({"y", "yes", "approve", "approved"}), frozenset({"n", "no", "nope"})
-
-
-class TurnTaker(Protocol):
-    """What takes turns: an `Agent`, whose methods these are."""
-
-    model: Model
-
-    @property
-    def arun(self) -> Callable[..., Awaitable[Run]]:
-        """See `Agent.arun`."""
-        ...
-
-    @property
-    def asay(self) -> Callable[..., Awaitable[Run]]:
-        """See `Agent.asay`."""
-        ...
-
-    @property
-    def aresume(self) -> Callable[..., Awaitable[Run]]:
-        """See `Agent.aresume`."""
-        ...
-
-    async def aclose(self) -> None:
-        """See `Agent.aclose`."""
-        ...
 
 
 @dataclass
@@ -112,6 +78,15 @@ class Session:
         """
         if is_stop(words):
             return await self.astop()
+        if self.run is not None and (scale := scale_said(words, self.run.world.picture.size)):
+            return self._keep(await self._scaled(self.run, words, scale, options.get("show")))
+        if asks(self.run and self.run.outcome) and (place := place_said(words)):
+            options["pointed"] = (*options.get("pointed", ()), place)
+            return await self._said("", options)
+        return await self._said(words, options)
+
+    async def _said(self, words: str, options: SayOptions) -> Run:
+        """Take words that do not hold the robots."""
         show, pointed = options.get("show"), (*self.pointed, *options.get("pointed", ()))
         keep = options.get("keep_out", ())
         run, said = self.run, words
@@ -124,7 +99,7 @@ class Session:
             if not (shown or fresh or drops(run.outcome, kind)):
                 return self._keep(await self._answered(run, words, show))
             if shown:  # the answer is something pointed at
-                words = f"{run.report.instruction} {words}".strip()
+                words = f"{run.context.words} {words}".strip()
             elif fresh:
                 words = said = fresh
         elif run is not None and calls_off(words) and run.world.current == run.began.current:
@@ -151,6 +126,23 @@ class Session:
                 run, words, pointed=pointed, keep_out=keep, settings=settings, show=show
             )
         return self._keep(await made)
+
+    async def _scaled(self, run: Run, words: str, scale: float, show: Show | None) -> Run:
+        """Note the picture's scale; a first instruction that left something open is read anew."""
+        size = run.world.picture.size
+        told = scale_told(scale, size)
+        fixed: dict[str, Any] = {"metres_per_pixel": scale}
+        if asks(run.outcome) and run.world.current is None:
+            agent, said = copy.copy(self.agent), run.context.words
+            agent.model = Telling(agent.model, told)
+            for name in ("robots", "starts"):  # the same instruction: its numbers still hold
+                fixed[name] = getattr(run.context.settings, name)
+            settings = await self._for_turn(said)
+        else:
+            agent, said = self._commanded(text=told + AGAIN), words
+            settings = self._fixed(run).model_copy(update={"may_deploy": False})
+        settings = settings.model_copy(update=fixed)
+        return await agent.asay(run, said, settings=settings, show=show)
 
     async def aact(
         self,
@@ -283,6 +275,9 @@ class Session:
         outcome = run.outcome
         assert isinstance(outcome, Paused)
         if outcome.call.name == "ask_user":
+            if again := asked_again(outcome.call, words, self._standing(run)):
+                asking = self._commanded([("ask_user", again)])
+                return await asking.aresume(run, answer=words, show=show)
             fixed = run.context.settings
             fixed = fixed.model_copy(update={"may_deploy": fixed.may_deploy and self.may_move})
             left = replace(run, context=replace(run.context, settings=fixed))
@@ -357,30 +352,6 @@ class Session:
             if self.run is not None:
                 await self.run.context.services.close_fleets()
             await self.agent.aclose()
-
-
-async def stop_all(fleets: Iterable[Fleet]) -> None:
-    """Stop every fleet, even if another one fails to stop.
-
-    Raises:
-        FleetError: of the first fleet that could not be stopped.
-    """
-    ends = await asyncio.gather(*(fleet.stop() for fleet in fleets), return_exceptions=True)
-    for problem in ends:
-        if isinstance(problem, BaseException):
-            raise problem
-
-
-def is_stop(words: str, *, driving: bool = False) -> bool:
-    """Return whether words say to hold the robots at once.
-
-    Args:
-        driving: whether a turn is under way that may be driving them.
-    """
-    said = words.lower()
-    if driving:
-        return len(said.split()) <= SHORT and STOP_DRIVING.search(said) is not None
-    return STOP.fullmatch(said) is not None
 
 
 def in_own_loop(work: Coroutine[Any, Any, Any]) -> Any:

@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from ..tools.fleet.protocol import Fleet, FleetBusyError
 from ..tools.tool import to_its_end
-from .conversation import stop_all
+from .stopping import stop_all
 from .store.protocol import PROCESS, Store
 
 TRIES, PAUSE = 20, 0.05

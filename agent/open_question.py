@@ -4,11 +4,16 @@ No robots move on words alone before it is settled: what it is about would be lo
 """
 
 import re
+from typing import Any
 
 from ..tools.errors import InputError
+from .messages import Call
 from .offline.accounting import read_instruction
+from .offline.answering import talk
 from .offline.drafting import things_needed
-from .outcomes import Paused
+from .offline.followups import read_followup
+from .offline.standing import Standing
+from .outcomes import Outcome, Paused
 
 LED = r"\W*(?:(?:oh|ok|okay|no|well|ah|actually|please|then|just)\b\W*)*"
 ENDS = r"(?:\W+(?:please|then|thanks|thank you))*\W*"
@@ -46,9 +51,30 @@ def calls_off(words: str, *, undoing: bool = False) -> bool:
     return bool(CALLED_OFF.fullmatch(said) or (undoing and UNDONE.fullmatch(said)))
 
 
+def asks(outcome: Outcome | None) -> bool:
+    """Return whether a turn waits for the answer to a question."""
+    return isinstance(outcome, Paused) and outcome.call.name == "ask_user"
+
+
 def drops(outcome: Paused, kind: str) -> bool:
     """Return whether words of a kind, as in `Followup`, drop what a turn waits for."""
     return kind in DROPS or (kind in ASIDE and outcome.call.name != "ask_user")
+
+
+def asked_again(call: Call, words: str, standing: Standing | None) -> dict[str, Any]:
+    """Return the arguments that ask a question again after help; {} if words ask for no help.
+
+    Args:
+        call: of `ask_user`, which asked the question.
+        words: said while it is open.
+        standing: the current plan.
+    """
+    said = read_followup(words, standing)
+    if (said.kind, said.about) != ("talk", "help"):
+        return {}
+    told = talk(said, standing, ())
+    question = str(call.arguments["question"]).removeprefix(told).strip()
+    return {**call.arguments, "question": f"{told} {question}"}
 
 
 def whole_instruction(words: str, metres_per_pixel: float | None, kind: str) -> str:

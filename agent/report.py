@@ -21,6 +21,7 @@ from ..tools.perception.target_prompt import Box
 from ..tools.world import PlanNode, Target, World
 from .messages import Call, History, Message, Reply, Result, failed_before, replies_of, turn_of
 from .outcomes import Answered, Cancelled, Outcome, Paused, Stopped
+from .titles import title_of
 
 Status = Literal[
     "deployed",
@@ -63,7 +64,8 @@ class Report(BaseModel):
     """Status, what was found, the contract, its certificate, and what was observed.
 
     Lengths are pixels of the picture as the user sees it (x right, y down); positions are in
-    robot order over all groups. What does not apply is None; `metric` is the same in metres where
+    robot order over all groups. `instruction` is what was said, with what answered questions.
+    What does not apply is None; `metric` is the same in metres where
     the picture's scale is known, see `metric_data`.
     """
 
@@ -188,7 +190,7 @@ def make_report(
     return Report(
         status=status,
         message=message,
-        instruction=context.words,
+        instruction=title_of(context.words, turn_of(outcome.messages)),
         image=_picture_data(context),
         targets=tuple(target_data(t) for t in world.targets),
         candidates=_candidates(outcome, context),

@@ -15,12 +15,13 @@ from ..tools.perception.image import Picture
 from ..tools.perception.target_prompt import TargetPrompt
 from .agent import Agent
 from .approvals import Waiting, check_nonce, is_waiting, waiting
-from .conversation import NOTHING_SAID, Session, is_stop
+from .conversation import NOTHING_SAID, Session
 from .feed import Poses
 from .fleet_owner import FleetOwner
 from .open_sessions import OpenSessions
 from .session import Run, SayOptions, Show
 from .session_start import Opening
+from .stopping import is_stop
 from .store.copies import fork
 from .store.protocol import Event, Store
 from .turns import PATIENCE, Asked, Turn, check_key, digest_of, is_noted, note_stop

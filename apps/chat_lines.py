@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..agent.agent import Agent
-from ..agent.conversation import is_stop
 from ..agent.outcomes import Answered
 from ..agent.report import Report, Status, Totals
 from ..agent.service import Service
 from ..agent.session import Run, Show
+from ..agent.stopping import is_stop
 from ..tools.context import Context, View, unseen
 from ..tools.errors import StorageError
 from ..tools.formation.plan import Plan

@@ -35,6 +35,7 @@ from .protocol import (
     missing,
     new_id,
     now,
+    renamed,
 )
 from .schema import EVENTS, FILES, SESSIONS, TURNS, engine_of, prepare
 
@@ -103,10 +104,14 @@ class DatabaseStore:
 
     def rename(self, session: str, name: str) -> None:
         """See `Store.rename`."""
-        renamed = update(SESSIONS).where(SESSIONS.c.id == session).values(name=checked_name(name))
+        row = SESSIONS.c.id == session
         with self.writing() as connection:
-            if not connection.execute(renamed).rowcount:
+            # Written first: it locks the row, and fails at once for whoever may not write.
+            same = update(SESSIONS).where(row).values(name=SESSIONS.c.name)
+            if not connection.execute(same).rowcount:
                 raise missing(f"The session {session!r}")
+            old = connection.execute(select(SESSIONS.c.name).where(row)).scalar_one()
+            connection.execute(update(SESSIONS).where(row).values(name=renamed(old, name)))
 
     def delete(self, session: str) -> None:
         """See `Store.delete`."""

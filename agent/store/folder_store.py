@@ -24,6 +24,7 @@ from .protocol import (
     missing,
     new_id,
     now,
+    renamed,
 )
 
 FACTS = "session.json"
@@ -103,7 +104,8 @@ class FolderStore:
     def rename(self, session: str, name: str) -> None:
         """See `Store.rename`."""
         folder = self._log(session).parent
-        _write_facts(folder, checked_name(name), _named(folder)[1])
+        old, made = _named(folder)
+        _write_facts(folder, renamed(old, name), made)
 
     def delete(self, session: str) -> None:
         """See `Store.delete`."""

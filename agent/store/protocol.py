@@ -178,7 +178,7 @@ class Store(Protocol):
         ...
 
     def rename(self, session: str, name: str) -> None:
-        """Give a session another name.
+        """Give a session another name; marks at the end of the old one stay, see `renamed`.
 
         Raises:
             StorageError: there is none (`missing`), or it cannot be written.
@@ -215,6 +215,8 @@ class Store(Protocol):
 
 MAX_NAME = 200
 """Most characters of a session's name."""
+_MARKS = re.compile(r"(?:(?:^| )\[[0-9a-f]{12}\])+$")
+"""Marks at the end of a name, by which a chat client's next message finds its session again."""
 _HASH = re.compile(rb'"([0-9a-f]{64})"')
 
 
@@ -250,6 +252,17 @@ def checked_name(name: str) -> str:
             f"{line[:40]!r} has {len(line)}."
         )
     return line
+
+
+def renamed(old: str, name: str) -> str:
+    """Return a session's new name, which ends with the marks of the old one.
+
+    Raises:
+        InputError: as of `checked_name`.
+    """
+    marks = _MARKS.search(old)
+    given = _MARKS.sub("", checked_name(name)) if marks else checked_name(name)
+    return f"{given} {marks[0].strip()}".strip() if marks else given
 
 
 def matches(facts: SessionFacts, said: Sequence[str], text: str) -> bool:

@@ -24,10 +24,10 @@ class Commands:
         self._calls, self._text = calls, text
 
     async def reply(self, request: Request) -> Reply:
-        """Return the calls, or once they are answered the sentence that ends the turn."""
+        """Return the calls, or once they are made the sentence that ends the turn."""
         turn = turn_of(request.messages)
         results = [m for m in turn if isinstance(m, Result)]
-        if results:
+        if results and not self._calls:
             asked = {c.id: c.arguments for m in turn if isinstance(m, Reply) for c in m.calls}
             return Reply(text=" ".join(_result_text(m, asked[m.call_id]) for m in results))
         number = sum(isinstance(m, Reply) for m in request.messages) + 1
@@ -35,7 +35,8 @@ class Commands:
             Call(id=f"command-{number}-{k}", name=name, arguments=arguments)
             for k, (name, arguments) in enumerate(self._calls)
         )
-        return Reply(text=self._text, calls=tuple(calls))
+        reply, self._calls = Reply(text=self._text, calls=tuple(calls)), ()
+        return reply
 
 
 def _result_text(result: Result, arguments: Mapping[str, Any]) -> str:

@@ -13,11 +13,13 @@ from mcp.server.auth.provider import AccessToken
 from mcp.server.mcpserver import Context
 from mcp.server.mcpserver.exceptions import ToolError, UnexpectedToolError
 from mcp.server.transport_security import TransportSecuritySettings
-from mcp_types import CallToolResult, InputRequiredResult
+from mcp_types import INVALID_REQUEST, CallToolResult, InputRequiredResult
 from pydantic import ValidationError
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
+from starlette.responses import JSONResponse
 from starlette.routing import Route
-from starlette.types import Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 from ...tools.tool import violations
 from ..server.hub import Hub
@@ -26,20 +28,28 @@ from .access import Access
 from .resources import add_resources
 from .tools import add_tools
 
+SESSION = "mcp-session-id"
+"""The header that names an MCP session of the older era, which is one process's."""
 INSTRUCTIONS = (
     "Places a team of robots in a picture as a person says, proves the placement, and drives them "
     "there. Call open_scene, then instruct with the person's own words, which it interprets: do "
     "not compute positions. Show its messages and questions to the person. Only "
     "approve_and_deploy moves robots; stop holds them at once."
 )
+GONE = (
+    "This process has no such MCP session: it ended, the server was started anew, or a balancer "
+    "sent the request to another process, and has to send all of a client's to the same one. "
+    "Connect again; the sessions of open_scene are whole, and their ids still hold."
+)
 
 
 class _Server(MCPServer[Access]):
-    """A server that says in one sentence which arguments a call lacks, or has wrong."""
+    """A server that says which arguments a call lacks, has wrong, or that no tool knows."""
 
     async def call_tool(
         self, name: str, arguments: dict[str, Any], context: Context[Access, Any] | None = None
     ) -> CallToolResult | InputRequiredResult:
+        await self._check_known(name, arguments)
         try:
             return await super().call_tool(name, arguments, context)
         except ToolError as error:
@@ -48,6 +58,17 @@ class _Server(MCPServer[Access]):
                 raise
             told = f"{name} cannot be called with these arguments: {violations(wrong)}"
             raise ToolError(told) from wrong
+
+    async def _check_known(self, name: str, arguments: dict[str, Any]) -> None:
+        """Refuse arguments that a tool does not have; the library would drop them silently."""
+        offered = {tool.name: tool.input_schema for tool in await self.list_tools()}
+        known = list(offered.get(name, {}).get("properties", arguments))
+        unknown = [f"{argument[:100]!r}" for argument in arguments if argument not in known]
+        if unknown:
+            raise ToolError(
+                f"{name} does not know {', '.join(unknown)}; nothing was done. Its arguments are "
+                f"{', '.join(known)}: leave out the others, or call them so."
+            )
 
 
 def make_server(hub: Hub, folders: Sequence[Path] = ()) -> MCPServer[Access]:
@@ -98,7 +119,21 @@ class Endpoint:
         """Answer a request; MCP sessions and questions belong to the token they began with."""
         person: Person = scope["state"]["person"]
         token = AccessToken(token="", client_id=person.name, scopes=[person.scope])
-        await self._app({**scope, "user": AuthenticatedUser(token)}, receive, send)
+        known = {**scope, "user": AuthenticatedUser(token)}
+        gone = False
+
+        async def explained(message: Message) -> None:
+            nonlocal gone
+            gone = gone or message.get("status") == 404
+            if not gone:
+                await send(message)
+
+        in_session = SESSION in Headers(scope=scope)
+        await self._app(known, receive, explained if in_session else send)
+        if gone:
+            error = {"code": INVALID_REQUEST, "message": GONE}
+            told = JSONResponse({"jsonrpc": "2.0", "id": None, "error": error}, 404)
+            await told(scope, receive, send)
 
 
 def mount(app: Starlette, hub: Hub) -> None:

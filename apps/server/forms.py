@@ -121,7 +121,7 @@ class TurnState(BaseModel):
             turn=number,
             status=report.status,
             message=report.message,
-            words=report.instruction,
+            words=run.context.words,
             by=by,
             report=report,
         )

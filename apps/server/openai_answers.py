@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 
 from fastapi import Request
 
-from ...agent.conversation import is_stop
 from ...agent.outcomes import Cancelled, Paused
 from ...agent.report import Totals
 from ...agent.session import Run
+from ...agent.stopping import is_stop
 from ...agent.turns import Turn
 from ...tools.draw import draw_plan
 from ...tools.errors import FormupError, InputError

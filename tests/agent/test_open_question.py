@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from formup.agent.agent import Agent
 from formup.agent.conversation import DROPPED, Session
+from formup.agent.messages import Call, Reply, Result
+from formup.agent.model import Request
 from formup.tools.errors import InputError
 from formup.tools.fleet.protocol import Motion
 from formup.tools.perception.image import picture_from_array
@@ -74,6 +76,48 @@ def test_a_question_or_help_is_answered_and_the_question_stays_open(
         assert report.message.endswith("How many robots? Say a number, or as many as needed.")
     done = open_session.say("5").report
     assert (done.status, len(done.positions or ())) == ("planned", 5)
+
+
+class Asking:
+    """A language model that asks how many, and takes what comes for the answer."""
+
+    name = "asking"
+
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    async def reply(self, request: Request) -> Reply:
+        last = request.messages[-1]
+        if isinstance(last, Result):
+            self.heard.append(last.text)
+            return Reply(text="Thank you.")
+        asked = {"question": "Which side?", "options": ["the left side", "the right side"]}
+        return Reply(calls=(Call(id="q", name="ask_user", arguments=asked),))
+
+
+def test_help_never_reaches_a_model_as_the_answer() -> None:
+    model = Asking()
+    session = Agent(model).start(picture_from_array(np.full((90, 120, 3), 60, np.uint8)))
+    asked = session.say("six of them")
+    for words in ("help", "what can you do?", "help me", "help", "help", "help"):
+        report = session.say(words).report
+        assert report.status == "question"
+        assert report.message.startswith("Say what the robots should do")
+        assert report.message.endswith(f" {asked.report.message}")
+        assert report.message.count("Say what the robots should do") == 1
+        assert report.options == asked.report.options
+    assert not model.heard
+    done = session.say("2").report
+    assert model.heard == ["2"]
+    assert (done.message, done.instruction) == ("Thank you.", "six of them (the right side)")
+
+
+def test_a_title_says_what_was_asked_in_the_end(open_session: Session) -> None:
+    open_session.say("what do you see?")
+    assert open_session.run is not None
+    assert open_session.run.report.instruction == "surround the red thing"
+    assert open_session.say("5").report.instruction == "surround the red thing (5)"
+    assert open_session.say("a bit further out").report.instruction == "a bit further out"
 
 
 @pytest.mark.parametrize("before", ["", "forget that, ", "No, instead "])

@@ -1,5 +1,5 @@
 import pytest
-from formup.agent.conversation import is_stop
+from formup.agent.stopping import is_stop
 
 
 @pytest.mark.parametrize(

@@ -109,6 +109,17 @@ def test_sessions_are_listed_searched_and_renamed(store: Store) -> None:
 
 
 @everywhere
+def test_a_new_name_keeps_the_marks_that_a_chat_finds_it_by(store: Store) -> None:
+    mark, chat = "[0123456789ab]", "[cdef01234567]"
+    for begun in (f"Cage it {mark} {chat}", f"{mark} {chat}"):
+        made = store.create(begun)
+        for name in ("Coins", f"Coins {mark} {chat}", f"Coins {chat}"):
+            store.rename(made.id, name)
+            named = {facts.id: facts.name for facts in store.sessions()}
+            assert named[made.id] == f"Coins {mark} {chat}"
+
+
+@everywhere
 def test_a_session_that_is_not_there_is_refused(store: Store, tmp_path: Path) -> None:
     (tmp_path / "trace.jsonl").write_text("{}")
     for name in ("nothing", "", "..", "../sessions", "'; DROP TABLE formup_events; --"):

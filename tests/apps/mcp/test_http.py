@@ -8,6 +8,7 @@ import sys
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +53,9 @@ class Place:
 
 
 @asynccontextmanager
-async def served(folder: Path) -> AsyncGenerator[Place]:
+async def served(folder: Path, made: dict[str, str] | None = None) -> AsyncGenerator[Place]:
     tokens = Tokens(folder / "tokens.json")
-    made = {
+    made = made or {
         name: tokens.add(name, scope)
         for name, scope in (("ann", "move"), ("bob", "move"), ("pat", "plan"), ("rae", "read"))
     }
@@ -223,6 +224,35 @@ def test_nobody_gets_in_without_a_token(place: Places) -> None:
             assert (await ann.post("/mcp", json=ping, headers=hers)).status_code == 200
 
     place(talk)
+
+
+@pytest.mark.usefixtures("real")
+def test_behind_a_balancer_that_changes_the_process(tmp_path: Path, era: str) -> None:
+    async def talk(there: Place, http: httpx2.AsyncClient) -> None:
+        transport = streamable_http_client(f"{there.url}/mcp", http_client=http)
+        person = Someone(approve=True)
+        async with Client(transport, mode=era, elicitation_callback=person) as client:
+            if era == "legacy":
+                with pytest.raises(MCPError, match="a balancer sent the request to another"):
+                    await caged(client, URL)
+                return
+            plan = await caged(client, URL)
+            wanted = {"session": plan["session"], "plan_id": plan["plan_id"]}
+            told = await call(client, "approve_and_deploy", idempotency_key="k", **wanted)
+            assert "is used by" in told["message"], "real robots are had by the process that asked"
+
+    async def balanced() -> None:
+        async with served(tmp_path) as one, served(tmp_path, one.tokens) as two:
+            ports = cycle(httpx2.URL(place.url).port for place in (one, two))
+
+            async def balance(request: httpx2.Request) -> None:
+                request.url = request.url.copy_with(port=next(ports))
+
+            async with one.http("ann") as http:
+                http.event_hooks = {"request": [balance]}
+                await talk(one, http)
+
+    asyncio.run(balanced())
 
 
 def test_the_command_serves_what_formup_serve_does(tmp_path: Path, era: str) -> None:

@@ -204,6 +204,27 @@ def test_refusals_are_one_sentence(with_server: Runs, era: str) -> None:
     with_server(talk)
 
 
+def test_unknown_arguments_are_refused_by_name(with_server: Runs, era: str) -> None:
+    async def talk(server: MCPServer[Any], hub: Hub) -> None:
+        async with Client(server, mode=era) as client:
+            session = (await caged(client))["session"]
+            before = hub.service.events(session)
+            refused = await refusal(
+                client, "instruct", session=session, words="a bit further out", robot=3, text="x"
+            )
+            assert refused == (
+                "instruct does not know 'robot', 'text'; nothing was done. Its arguments are "
+                "session, words, points, idempotency_key, detail, picture: leave out the others, "
+                "or call them so."
+            )
+            yes = {"plan_id": "p", "idempotency_key": "k", "answer": {"approve": True}}
+            refused = await refusal(client, "approve_and_deploy", session=session, **yes)
+            assert refused.startswith("approve_and_deploy does not know 'answer';")
+            assert hub.service.events(session) == before
+
+    with_server(talk)
+
+
 def test_what_is_our_fault_is_masked(
     with_server: Runs, era: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -220,6 +220,19 @@ def test_a_chat_copied_under_another_name_goes_on_in_a_session_of_its_own(
     assert turns(store) == {s: [CAGE, "a bit closer", "undo"] for s in (first, second)}
 
 
+@pytest.mark.parametrize("named", [{}, {"metadata": {"chat_id": "one"}}])
+def test_a_chat_goes_on_in_its_session_when_that_is_renamed(
+    serve: Serve, chat: Any, store: Store, named: dict[str, Any]
+) -> None:
+    talk = chat(serve())
+    session = session_of(talk.say(CAGE, "us_coins.jpg", **named))
+    store.rename(session, "coins on Monday")
+    talk.messages = [m for m in talk.messages if m["role"] == "user"]
+    assert session_of(talk.say("a bit further out", **named)) == session
+    assert turns(store) == {session: [CAGE, "a bit further out"]}
+    assert store.sessions()[0].name.startswith("coins on Monday [")
+
+
 def test_a_session_that_was_deleted_is_told(serve: Serve, chat: Any, store: Store) -> None:
     talk = chat(serve())
     session = session_of(talk.say(CAGE, "us_coins.jpg"))
