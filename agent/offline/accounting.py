@@ -47,6 +47,8 @@ WITHIN = frozenset(PLACES["inside"])
 ON_A_SIDE = re.compile(
     r"\b(?:on|to|at|from) (?:the |its )?(?:left|right|top|bottom)$", re.IGNORECASE
 )
+CORRECTED = re.compile(r"\w\W*[.,;-]\s*(sorry|no wait|i mean|oops)\s*,", re.IGNORECASE)
+"""Words within an instruction that take something back; what is left of it cannot be told."""
 OUTWARD = frozenset(("off", "away", "clear", "out", "outside"))
 """Words that make a distance one to keep outside the thing."""
 
@@ -63,6 +65,8 @@ def read_instruction(text: str, metres_per_pixel: float | None = None) -> Readin
     meaning = meaning_of(words, tagging, items)
     meanings = sorted(meaning.items(), key=lambda m: -m[1])
     stops = tuple((kind, " ".join(text[a:b].split())) for kind, a, b in stops_in(items))
+    if (put_right := CORRECTED.search(text)) is not None:
+        stops = (*stops, ("a correction", put_right[1]))
     language = foreign_language([w.text for w in words]) or ""
     reading = Reading(meanings, form=form, stops=stops, language=language)
     return _Reader(text, items, reading, metres_per_pixel).read()

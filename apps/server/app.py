@@ -47,17 +47,7 @@ def make_app(service: Service, settings: ServerSettings, tokens: Tokens) -> Fast
         redoc_url=None,
     )
     app.state.hub = hub
-    for part in (
-        page,
-        health,
-        sessions,
-        scenes,
-        sharing,
-        turns,
-        streams,
-        openai_chat,
-        openai_responses,
-    ):
+    for part in PARTS:
         app.include_router(part.router)
     if find_spec("mcp") is not None:
         from ..mcp.server import mount

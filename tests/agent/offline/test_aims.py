@@ -253,3 +253,8 @@ def test_arrangements_as_strangers_say_them(
 )
 def test_what_changes_the_arrangement_is_no_background(words: str) -> None:
     assert read_instruction(words).unread
+
+
+def test_a_correction_within_a_line_is_asked_about() -> None:
+    words = "two rows... sorry, one row of six above the stage, all facing it"
+    assert read_instruction(normalized_instruction(words)).stops
