@@ -208,6 +208,10 @@ def spacing(slots: Slots, said: Utterance) -> Effects:
     ]
 
 
+FEW_DEGREES = 5.0
+"""Least number without a unit that is an angle."""
+
+
 def rotate(slots: Slots, said: Utterance) -> Effects:
     """Rotate the formation, clockwise unless stated otherwise."""
     directions = {
@@ -220,6 +224,10 @@ def rotate(slots: Slots, said: Utterance) -> Effects:
     for name in ("angle", "num"):
         if name in slots:
             degrees = float(slots[name][0])
+    bare = float(slots["num"][0]) if "num" in slots else FEW_DEGREES
+    if bare < FEW_DEGREES and not STEP.search(said.words):
+        n = f"{bare:g}"
+        return ask(f"Turn it by {n} of what?", f"turn {n} place clockwise", f"turn {n} degrees")
     if "num" in slots and STEP.search(said.words):
         degrees *= 360 / max(said.count, 1)  # "one place clockwise"
     sign = -1 if "ccw" in directions else 1

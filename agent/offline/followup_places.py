@@ -29,7 +29,7 @@ TOWARDS = {
     **dict.fromkeys(("top", "upper", "upp", "high", "north"), (0, -1)),
     **dict.fromkeys(("bottom", "lower", "low", "south"), (0, 1)),
 }
-BOT = r"(?:robot|bot|drone|rover|unit|machine|lad|guy|fella|fellow|chap|boy)"
+BOT = r"(?:robot|bot|drone|rover|unit|machine|lad|guy|fella|fellow|chap|boy|man)"
 END = r"(?:left|right|top|bottom|upper|lower|north|south|east|west)"
 MIDDLE = r"(?:middle|centre|center|central|cent(?:re|er)most|middlemost)"
 MOST = (

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
+from ...tools.formation.number_words import SMALL
 from .followup import Followup
 from .followup_edits import listed
 from .followup_places import AMOUNTS
@@ -24,6 +25,12 @@ THOSE = re.compile(
     rf"|\bthe (?P<m>{N}) of them{AFTER}|\bboth(?: of them| (?:of the )?{BOT}){AFTER}",
     re.IGNORECASE,
 )
+ALL_OF_SO_MANY = re.compile(
+    rf"\ball (?:of )?(?:the )?([0-9]+|{'|'.join(SMALL)})\b(?: of (?:you|them|us))?"
+    r"(?: (?:robots|bots|units))?(?! (?:sides?|corners?|things?|coins?|cars?|px|more|m\b))",
+    re.IGNORECASE,
+)
+"""All robots, with their number: "all four", "all 8 of you"."""
 THEM = re.compile(r"\b(?:them|they)\b", re.IGNORECASE)
 ALL = re.compile(r"\b(?:all|every\w*|whole|team|ring|circle|row|formation)\b", re.IGNORECASE)
 
@@ -42,9 +49,17 @@ def _named_in(edit: Mapping[str, Any]) -> list[int]:
     return [*row, *(edit[key] for key in ("robot", "a", "b") if key in edit)]
 
 
+def _all_if(match: re.Match[str], count: int) -> str:
+    """Return "all of them" for "all four" where there are four robots, else the words."""
+    said = match[1].lower()
+    number = int(said) if said.isdecimal() else SMALL.get(said)
+    return "all of them" if number == count else match[0]
+
+
 def with_numbers(words: str, standing: Standing) -> str:
     """Return the words with "those two" replaced by the robots' numbers."""
     robots = recent_robots(standing)
+    words = ALL_OF_SO_MANY.sub(lambda m: _all_if(m, len(standing.robots)), words)
 
     def numbers(match: re.Match[str]) -> str:
         said = next((n for n in match.groupdict().values() if n), None)
