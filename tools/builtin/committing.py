@@ -57,7 +57,7 @@ async def propose_formation(
 
     Args:
         contract: its robots add up to Robots, or the words' number. unit: of lengths, where
-            Metres per pixel is told; places are px. keep_out: further ids no robot may touch.
+            Metres per pixel is told; places are px. keep_out: ids no robot may touch.
             reading: only after a doubt, why this is meant.
         targets: things not measured yet, or to correct.
         positions: (x, y) of all robots in order of the groups.

@@ -42,10 +42,10 @@ class Mask(BaseModel):
 
 
 class TargetPrompt(BaseModel):
-    """By outline (vertices in order; the surest way), box (x0, y0, x1, y1), points or candidate.
+    """By outline (vertices in order; surest), box (x0, y0, x1, y1), points or candidate.
 
-    text: a bare noun. straight: its sides are. points on it, negative ones off it correct an
-    outline or box there, also alone, by the id of one measured.
+    text: a bare noun. straight: its sides are. points on it, negative ones off it correct
+    what is given there, or by its id what is measured.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
